@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Compact storage of a group's instances: 32 bytes each for rotation, uniform scale and translation; any other affine map
+// costs 100 bytes more.
+#pragma once
+
+#include <core/math.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace stipple {
+
+// What an instance shows: a mesh or a group.
+struct ChildRef {
+    uint32_t bits = 0;
+
+    static ChildRef mesh(uint32_t index) { return {index}; }
+    static ChildRef group(uint32_t index) { return {index | 0x80000000u}; }
+    bool isGroup() const { return bits >> 31; }
+    uint32_t index() const { return bits & 0x7fffffffu; }
+    bool operator==(const ChildRef& o) const { return bits == o.bits; }
+};
+
+class InstanceStore {
+public:
+    // domain: a box of group space that holds the instances' translations; positions are kept to 2^-32 of its size. Translations
+    // outside it are kept exactly, at the higher price.
+    explicit InstanceStore(const DBox3& domain = DBox3{DVec3(-1), DVec3(1)});
+
+    void add(ChildRef child, const Affine& group_from_child);
+    void reserve(size_t n) { records_.reserve(n); }
+    size_t size() const { return records_.size(); }
+    ChildRef child(size_t i) const { return records_[i].child; }
+    Affine groupFromChild(size_t i) const;
+    // maxAreaScale() of groupFromChild(i).linear, without decoding the rotation.
+    double areaScale(size_t i) const;
+    // Reorders: new record i is old record order[i].
+    void permute(const std::vector<uint32_t>& order);
+    size_t bytes() const { return records_.capacity() * sizeof(Record) + general_.capacity() * sizeof(Affine); }
+
+private:
+    // scale 0 marks an index into general_ (in position[0]).
+    struct Record {
+        int32_t position[3];   // translation = origin_ + step_ * position
+        float rotation[3];     // x, y, z of a unit quaternion with w >= 0
+        float scale;           // uniform, negative: mirrored (all axes)
+        ChildRef child;
+    };
+    static_assert(sizeof(Record) == 32);
+
+    DVec3 origin_;
+    DVec3 step_;
+    std::vector<Record> records_;
+    std::vector<Affine> general_;
+};
+
+}  // namespace stipple

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Materials and pictures of a glTF file. Internal to the glTF loader.
+#pragma once
+
+#include <scenegraph/io/gltf_document.h>
+#include <scenegraph/scene.h>
+
+#include <map>
+#include <tuple>
+
+namespace stipple {
+
+// Where a base texture is looked up: which TEXCOORD set, and KHR_texture_transform, which loaders bake into the uvs.
+struct GltfTextureUse {
+    bool is_textured = false;
+    int texcoord = 0;
+    Vec2 offset = Vec2(0.0f);
+    Vec2 scale = Vec2(1.0f);
+    float rotation = 0.0f;  // radians
+
+    Vec2 apply(Vec2 uv) const;
+};
+
+struct GltfMaterial {
+    uint16_t index = 0;  // into Scene::materials
+    GltfTextureUse base_texture;
+};
+
+// Adds the materials that are asked for to the scene, each once.
+class GltfMaterials {
+public:
+    GltfMaterials(const GltfDocument& document, Scene& scene) : document_(document), scene_(scene) {}
+
+    // material: index in the file, -1 for glTF's default. path: where that index stands.
+    const GltfMaterial& get(int material, const std::string& path);
+
+private:
+    // Texture (index in the file) as Scene::textures index. is_opaque: alpha has no meaning and is set to 1.
+    int texture(int index, bool is_opaque, const std::string& path);
+    int imageOf(int texture, const std::string& path) const;
+    const Texture::Level& picture(int image);
+    // Mean of a texture's texels, as linear values.
+    Vec4 mean(int texture, bool is_srgb, const std::string& path);
+    Material convert(const tinygltf::Material& source, GltfTextureUse& use, const std::string& path);
+
+    const GltfDocument& document_;
+    Scene& scene_;
+    std::map<int, GltfMaterial> materials_;
+    std::map<int, Texture::Level> pictures_;
+    std::map<std::tuple<int, int, bool>, int> textures_;  // by image, sampler and whether it is opaque
+};
+
+}  // namespace stipple

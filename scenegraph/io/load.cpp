@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <scenegraph/io/load.h>
+
+#include <scenegraph/io/gltf.h>
+#include <scenegraph/io/json.h>
+#include <scenegraph/io/scene_file.h>
+
+#include <new>
+
+namespace stipple {
+
+namespace {
+
+Scene loadAsset(const std::string& path, LoadContext& context) {
+    Scene scene;
+    const ChildRef child = loadGltf(std::filesystem::path(path), path, scene, context);
+    if (!child.isGroup()) {
+        Group group;
+        group.name = scene.meshes[child.index()].name;
+        group.instances.add(child, Affine());
+        scene.groups.push_back(std::move(group));
+    }
+    scene.root = child.isGroup() ? child.index() : uint32_t(scene.groups.size() - 1);
+    if (scene.lighting.suns.empty()) {
+        Sun sun;
+        sun.direction_to_light = glm::normalize(sun.direction_to_light);
+        scene.lighting.suns.push_back(sun);
+    }
+    return scene;
+}
+
+bool endsWith(const std::string& path, const char* extension) {
+    std::string lower = path;
+    for (char& c : lower) c = char(std::tolower(uint8_t(c)));
+    return lower.ends_with(extension);
+}
+
+}  // namespace
+
+Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool& pool, Diagnostics& diagnostics) {
+    try {
+        LoadContext context(options, diagnostics, folderOf(path));
+        context.throwIfCancelled();
+        const bool is_asset = endsWith(path, ".gltf") || endsWith(path, ".glb");
+        if (!is_asset && !endsWith(path, ".scene.json")) {
+            throw Error(ErrorCode::kUnsupported, oneLine(path, 300), "is neither a scene file (*.scene.json) nor .gltf nor .glb");
+        }
+        Scene scene = is_asset ? loadAsset(path, context) : readSceneFile(path, path, context);
+        scene.path = path;
+        context.throwIfCancelled();
+        buildScene(scene, pool);
+        const DBox3 bounds = sceneBounds(scene);
+        if (bounds.isEmpty()) {
+            if (is_asset) throw Error(ErrorCode::kInvalidScene, oneLine(path, 300), "all its triangles have no area");
+            diagnostics.warn(oneLine(path, 300), "the scene is empty");
+        }
+        // Single assets always have a camera of that name, before their own.
+        if (scene.cameras.empty() || is_asset) {
+            Camera camera = bounds.isEmpty() ? Camera() : cameraForBounds(bounds);
+            camera.name = "default";
+            scene.cameras.insert(scene.cameras.begin(), camera);
+        }
+        return scene;
+    } catch (const std::bad_alloc&) {
+        throw Error(ErrorCode::kOutOfMemory, oneLine(path, 300), "the machine has not enough memory for it");
+    }
+}
+
+}  // namespace stipple

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures out of memory, through OpenImageIO.
+#pragma once
+
+#include <core/material.h>
+#include <scenegraph/io/load_context.h>
+
+#include <string>
+
+namespace stipple {
+
+// Decodes a PNG, JPEG or WebP picture into 8-bit RGBA. Throws kParse (not a picture, damaged), kUnsupported (another format),
+// kOutOfMemory.
+Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budget, const std::string& where);
+
+}  // namespace stipple

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <scenegraph/io/gltf.h>
+#include <scenegraph/io/scene_reader.h>
+
+#include <limits>
+
+namespace stipple {
+
+namespace {
+
+ChildRef loadFile(SceneReader& reader, const Json& asset, const JsonPath& path) {
+    JsonPath file_path = path;
+    file_path.push_back("file");
+    const std::string& file = asset["file"].get_ref<const std::string&>();
+    const std::filesystem::path full = resolvePath(reader.context, reader.folder, file, reader.where(file_path));
+    std::string extension = full.extension().string();
+    for (char& c : extension) c = char(std::tolower(uint8_t(c)));
+    if (extension != ".gltf" && extension != ".glb") {
+        throw Error(ErrorCode::kUnsupported, reader.where(file_path), inQuotes(file) + " is neither .gltf nor .glb");
+    }
+    if (const auto it = reader.files.find(full.string()); it != reader.files.end()) return it->second;
+    // Cameras and lights of an asset that stands in many places mean nothing.
+    const size_t n_cameras = reader.scene.cameras.size(), n_suns = reader.scene.lighting.suns.size();
+    const ChildRef child = loadGltf(full, file, reader.scene, reader.context);
+    reader.scene.cameras.resize(n_cameras);
+    reader.scene.lighting.suns.resize(n_suns);
+    return reader.files[full.string()] = child;
+}
+
+GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json& asset, const JsonPath& path) {
+    const std::string kind = asset["generate"].get<std::string>();
+    const auto takeTriangles = [&](double triangles) {
+        // Leaves and blades share few vertices: two for each triangle.
+        reader.context.budget.take(triangles * (kBytesPerTriangle + 2.0 * kBytesPerVertex), reader.where(path),
+                                   std::to_string(uint64_t(triangles)) + " triangles");
+    };
+    if (kind == "tree") {
+        TreeParams p;
+        readMember(asset, "species", p.species);
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "height", p.height);
+        readMember(asset, "triangles", p.triangles);
+        takeTriangles(p.triangles);
+        return makeTree(p);
+    }
+    if (kind == "grass") {
+        GrassParams p;
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "height", p.height);
+        readMember(asset, "radius", p.radius);
+        readMember(asset, "blades", p.blades);
+        constexpr double kMostTrianglesPerBlade = 16.0;
+        takeTriangles(p.blades * kMostTrianglesPerBlade);
+        return makeGrass(p);
+    }
+    if (kind == "rock") {
+        RockParams p;
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "radius", p.radius);
+        readMember(asset, "subdivisions", p.subdivisions);
+        takeTriangles(20.0 * std::pow(4.0, p.subdivisions));
+        return makeRock(p);
+    }
+    if (kind == "terrain") {
+        TerrainParams p;
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "size", p.size);
+        readMember(asset, "resolution", p.resolution);
+        readMember(asset, "relief", p.relief);
+        readMember(asset, "feature_size", p.feature_size);
+        readMember(asset, "style", p.style);
+        takeTriangles(2.0 * (p.resolution - 1.0) * (p.resolution - 1.0));
+        Terrain& terrain = reader.terrains[name];
+        terrain = {makeHeightField(p), p.size};
+        return makeTerrain(p, terrain.field);
+    }
+    int triangles = 1000;
+    Vec3 color(0.8f);
+    readMember(asset, "triangles", triangles);
+    readVector(asset, "color", color);
+    takeTriangles(triangles);
+    return makePrimitive(kind, triangles, color);
+}
+
+ChildRef addGenerated(SceneReader& reader, const std::string& name, GeneratedMesh generated, const JsonPath& path) {
+    Scene& scene = reader.scene;
+    const size_t first = scene.materials.size();
+    if (first + generated.materials.size() > size_t(std::numeric_limits<uint16_t>::max()) + 1) {
+        throw Error(ErrorCode::kUnsupported, reader.where(path), "the scene has more than 65536 materials");
+    }
+    for (uint16_t& material : generated.mesh.triangle_material) material = uint16_t(material + first);
+    for (Material& material : generated.materials) scene.materials.push_back(std::move(material));
+    generated.mesh.name = oneLine(name);
+    scene.meshes.push_back(std::move(generated.mesh));
+    return ChildRef::mesh(uint32_t(scene.meshes.size() - 1));
+}
+
+}  // namespace
+
+void readAsset(SceneReader& reader, const std::string& name, const Json& asset) {
+    const JsonPath path = {"assets", name};
+    if (asset.contains("file")) {
+        reader.children[name] = loadFile(reader, asset, path);
+        return;
+    }
+    reader.children[name] = addGenerated(reader, name, generate(reader, name, asset, path), path);
+}
+
+}  // namespace stipple

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <scenegraph/io/scene_reader.h>
+#include <scenegraph/io/schemas.h>
+#include <scenegraph/io/transform.h>
+
+#include <limits>
+
+namespace stipple {
+
+namespace {
+
+constexpr double kMaxLength = 1e9, kMaxFactor = 1e6;  // as in the schema
+
+struct Instance {
+    const std::string* child = nullptr;
+    DVec3 translation = DVec3(0), angles = DVec3(0), scale = DVec3(1);
+    double quaternion[4] = {0, 0, 0, 1};
+    double matrix[16];
+    bool has_parts = false, has_angles = false, has_quaternion = false, has_matrix = false;
+};
+
+bool readNumbers(const Json& value, size_t n, double limit, double* result) {
+    if (!value.is_array() || value.size() != n) return false;
+    for (size_t i = 0; i < n; ++i) {
+        if (!value[i].is_number()) return false;
+        result[i] = value[i].get<double>();
+        if (std::abs(result[i]) > limit) return false;
+    }
+    return true;
+}
+
+// False for anything that is not exactly as the schema's "instance" has it, which then says why.
+bool readInstance(const Json& source, Instance& result) {
+    if (!source.is_object()) return false;
+    for (auto it = source.begin(); it != source.end(); ++it) {
+        const std::string& key = it.key();
+        const Json& value = it.value();
+        if (key == "child") {
+            if (!value.is_string()) return false;
+            result.child = &value.get_ref<const std::string&>();
+        } else if (key == "translation") {
+            if (!readNumbers(value, 3, kMaxLength, &result.translation.x)) return false;
+            result.has_parts = true;
+        } else if (key == "rotation") {
+            if (!readNumbers(value, 3, kMaxFactor, &result.angles.x)) return false;
+            result.has_parts = result.has_angles = true;
+        } else if (key == "quaternion") {
+            if (!readNumbers(value, 4, kMaxFactor, result.quaternion)) return false;
+            result.has_parts = result.has_quaternion = true;
+        } else if (key == "scale") {
+            if (value.is_number()) {
+                result.scale = DVec3(value.get<double>());
+                if (std::abs(result.scale.x) > kMaxFactor) return false;
+            } else if (!readNumbers(value, 3, kMaxFactor, &result.scale.x)) {
+                return false;
+            }
+            result.has_parts = true;
+        } else if (key == "matrix") {
+            if (!readNumbers(value, 16, kMaxLength, result.matrix)) return false;
+            result.has_matrix = true;
+        } else {
+            return false;
+        }
+    }
+    return result.child != nullptr;
+}
+
+// nullptr, or what is wrong.
+const char* makeTransform(const Instance& instance, Affine& result) {
+    if (instance.has_matrix) {
+        if (instance.has_parts) return "has a matrix and other transforms too";
+        if (!affineFromMatrix(instance.matrix, result)) return "the matrix' last row is not 0 0 0 1";
+    } else {
+        if (instance.has_angles && instance.has_quaternion) return "has both rotation and quaternion";
+        DMat3 rotation(1.0);
+        if (instance.has_quaternion && !rotationFromQuaternion(instance.quaternion, rotation)) return "the quaternion is zero";
+        if (instance.has_angles) rotation = rotationFromEuler(instance.angles * (kPi / 180.0));
+        result = affineFromParts(instance.translation, rotation, instance.scale);
+    }
+    return isSingular(result.linear) ? "singular transform: it flattens what it places" : nullptr;
+}
+
+JsonPath joined(JsonPath path, std::initializer_list<std::string> rest) {
+    path.insert(path.end(), rest);
+    return path;
+}
+
+// The box of the translations, as far as they can be read; what is wrong is found by addInstances().
+DBox3 instancesDomain(const Json& instances) {
+    DBox3 box;
+    for (const Json& source : instances) {
+        DVec3 p(0);
+        double matrix[16];
+        if (source.is_object()) {
+            if (const auto it = source.find("translation"); it != source.end()) readNumbers(*it, 3, kMaxLength, &p.x);
+            if (const auto it = source.find("matrix"); it != source.end() && readNumbers(*it, 16, kMaxLength, matrix)) {
+                p = DVec3(matrix[12], matrix[13], matrix[14]);
+            }
+        }
+        box.extend(p);
+    }
+    return box;
+}
+
+void addInstances(SceneReader& reader, const Json& instances, InstanceStore& store, const JsonPath& group_path) {
+    size_t i = 0;
+    for (const Json& source : instances) {
+        if (i % 65536 == 0) reader.context.throwIfCancelled();
+        Instance instance;
+        const auto path = [&] { return joined(group_path, {"instances", std::to_string(i)}); };
+        if (!readInstance(source, instance)) {
+            static const JsonSchema schema(kSceneSchemaText, "instance");
+            const auto problem = schema.firstProblem(source);
+            JsonPath full = path();
+            if (!problem) reader.fail(full, "is not an instance");
+            full.insert(full.end(), problem->path.begin(), problem->path.end());
+            reader.fail(full, problem->message);
+        }
+        const auto child = reader.children.find(*instance.child);
+        if (child == reader.children.end()) reader.child(*instance.child, joined(path(), {"child"}));  // throws
+        Affine transform;
+        if (const char* problem = makeTransform(instance, transform)) reader.fail(path(), problem);
+        store.add(child->second, transform);
+        ++i;
+    }
+}
+
+template <class T>
+void checkOrder(const SceneReader& reader, const T& low, const T& high, const char* what, const JsonPath& path) {
+    if (low > high) reader.fail(path, std::string("min_") + what + " > max_" + what);
+}
+
+ScatterParams readScatter(const SceneReader& reader, const Json& source, const HeightField*& field, const JsonPath& path) {
+    ScatterParams p;
+    if (source.contains("on")) {
+        const std::string& on = source["on"].get_ref<const std::string&>();
+        const auto it = reader.terrains.find(on);
+        if (it == reader.terrains.end()) {
+            reader.child(on, joined(path, {"on"}));  // throws if the name is not known at all
+            reader.fail(joined(path, {"on"}), inQuotes(on) + " is not a terrain asset");
+        }
+        field = &it->second.field;
+        p.size = it->second.size;
+    }
+    for (size_t i = 0; i < source["items"].size(); ++i) {
+        const Json& item = source["items"][i];
+        ScatterItem result;
+        result.child = reader.child(item["child"].get<std::string>(), joined(path, {"items", std::to_string(i), "child"}));
+        readMember(item, "weight", result.weight);
+        p.items.push_back(result);
+    }
+    readMember(source, "count", p.count);
+    readMember(source, "size", p.size);
+    readVector(source, "center", p.center);
+    readDegrees(source, "min_slope", p.min_slope);
+    readDegrees(source, "max_slope", p.max_slope);
+    readMember(source, "min_height", p.min_height);
+    readMember(source, "max_height", p.max_height);
+    readMember(source, "min_scale", p.min_scale);
+    readMember(source, "max_scale", p.max_scale);
+    readDegrees(source, "tilt", p.tilt);
+    readMember(source, "align", p.align);
+    readMember(source, "sink", p.sink);
+    readMember(source, "clustering", p.clustering);
+    readMember(source, "seed", p.seed);
+    checkOrder(reader, p.min_slope, p.max_slope, "slope", path);
+    checkOrder(reader, p.min_height, p.max_height, "height", path);
+    checkOrder(reader, p.min_scale, p.max_scale, "scale", path);
+    return p;
+}
+
+GridParams readGrid(const SceneReader& reader, const Json& source, const JsonPath& path) {
+    GridParams p;
+    p.child = reader.child(source["child"].get<std::string>(), joined(path, {"child"}));
+    readMember(source, "count_x", p.count_x);
+    readMember(source, "count_z", p.count_z);
+    readMember(source, "spacing_x", p.spacing_x);
+    readMember(source, "spacing_z", p.spacing_z);
+    readMember(source, "jitter", p.jitter);
+    readMember(source, "quarter_turns", p.quarter_turns);
+    readMember(source, "any_turn", p.any_turn);
+    readMember(source, "min_scale", p.min_scale);
+    readMember(source, "max_scale", p.max_scale);
+    readMember(source, "hill_height", p.hill_height);
+    readMember(source, "hill_size", p.hill_size);
+    readMember(source, "seed", p.seed);
+    checkOrder(reader, p.min_scale, p.max_scale, "scale", path);
+    return p;
+}
+
+}  // namespace
+
+void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Json& instances) {
+    const std::string& name = reader.scene.groups[index].name;
+    const JsonPath path = {"groups", name};
+    const HeightField* field = nullptr;
+    ScatterParams scattered;
+    GridParams grid;
+    DBox3 domain = instancesDomain(instances);
+    double total = double(instances.size());
+    const auto count = [&](double n, const char* key) {
+        const JsonPath place = joined(path, {key});
+        reader.context.budget.take(n * kBytesPerInstance, reader.where(place), std::to_string(uint64_t(n)) + " instances");
+        total += n;
+        if (total > double(std::numeric_limits<uint32_t>::max())) {
+            throw Error(ErrorCode::kUnsupported, reader.where(place), "more than 2^32 instances in one group; nest groups instead");
+        }
+    };
+    reader.context.budget.take(total * kBytesPerInstance, reader.where(path), std::to_string(instances.size()) + " instances");
+    if (group.contains("scatter")) {
+        scattered = readScatter(reader, group["scatter"], field, joined(path, {"scatter"}));
+        count(double(scattered.count), "scatter");
+        domain.extend(scatterDomain(scattered, field));
+    }
+    if (group.contains("grid")) {
+        grid = readGrid(reader, group["grid"], joined(path, {"grid"}));
+        count(double(grid.count_x) * double(grid.count_z), "grid");
+        domain.extend(gridDomain(grid));
+    }
+    if (domain.isEmpty()) domain = DBox3{DVec3(-1), DVec3(1)};
+
+    InstanceStore store(domain);
+    store.reserve(size_t(total));
+    addInstances(reader, instances, store, path);
+    if (group.contains("scatter")) scatter(scattered, field, store);
+    reader.context.throwIfCancelled();
+    if (group.contains("grid")) placeGrid(grid, store);
+    reader.scene.groups[index].instances = std::move(store);
+}
+
+}  // namespace stipple

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+// Builds the octree over a mesh: connected patches, strata, Morton order, nodes, distribution list.
+#include <scenegraph/mesh.h>
+
+#include <core/error.h>
+#include <core/material.h>
+#include <scenegraph/morton.h>
+
+#include <array>
+#include <map>
+#include <numeric>
+#include <tuple>
+
+namespace stipple {
+
+namespace {
+
+constexpr uint32_t kLeafTriangles = 64;
+
+Error sceneError(const std::string& where, const std::string& message) {
+    return Error(ErrorCode::kInvalidScene, where, message);
+}
+
+void checkArrays(const Mesh& mesh, size_t n_materials, const std::string& where) {
+    const size_t n = mesh.positions.size();
+    if ((!mesh.normals.empty() && mesh.normals.size() != n) || (!mesh.uvs.empty() && mesh.uvs.size() != n) ||
+        (!mesh.colors.empty() && mesh.colors.size() != n) || mesh.triangle_material.size() != mesh.triangles.size()) {
+        throw sceneError(where, "vertex arrays differ in length");
+    }
+    for (size_t i = 0; i < n; ++i) {
+        if (!isFinite(DVec3(mesh.positions[i]))) {
+            throw sceneError(where, "position " + std::to_string(i) + " is not finite");
+        }
+    }
+    for (size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const UVec3& v = mesh.triangles[t];
+        const uint32_t largest = std::max({v.x, v.y, v.z});
+        if (largest >= n) {
+            throw sceneError(where, "triangle " + std::to_string(t) + ": index " + std::to_string(largest) +
+                                        " >= vertex count " + std::to_string(n));
+        }
+        if (mesh.triangle_material[t] >= n_materials) {
+            throw sceneError(where, "triangle " + std::to_string(t) + ": material " +
+                                        std::to_string(mesh.triangle_material[t]) + " >= material count " +
+                                        std::to_string(n_materials));
+        }
+    }
+}
+
+double triangleArea(const Mesh& mesh, const UVec3& t) {
+    const DVec3 a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
+    return 0.5 * glm::length(glm::cross(b - a, c - a));
+}
+
+struct DisjointSets {
+    std::vector<uint32_t> parent;
+    explicit DisjointSets(size_t n) : parent(n) { std::iota(parent.begin(), parent.end(), 0u); }
+    uint32_t find(uint32_t v) {
+        while (parent[v] != v) v = parent[v] = parent[parent[v]];
+        return v;
+    }
+    void join(uint32_t a, uint32_t b) { parent[find(a)] = find(b); }
+};
+
+// Area of the connected patch that each triangle belongs to. Vertices at the same position count as one: uv seams
+// and flat shading duplicate them.
+std::vector<double> patchAreas(const Mesh& mesh, const std::vector<double>& areas) {
+    const size_t n = mesh.positions.size();
+    std::vector<uint32_t> order(n), same(n);
+    std::iota(order.begin(), order.end(), 0u);
+    const auto key = [&](uint32_t v) {
+        const Vec3& p = mesh.positions[v];
+        return std::tie(p.x, p.y, p.z);
+    };
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
+    for (size_t i = 0; i < n; ++i) {
+        same[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? same[order[i - 1]] : order[i];
+    }
+    DisjointSets sets(n);
+    for (const UVec3& t : mesh.triangles) {
+        sets.join(same[t.x], same[t.y]);
+        sets.join(same[t.x], same[t.z]);
+    }
+    std::vector<double> sum(n, 0.0), result(mesh.triangles.size());
+    for (size_t t = 0; t < areas.size(); ++t) sum[sets.find(same[mesh.triangles[t].x])] += areas[t];
+    for (size_t t = 0; t < areas.size(); ++t) result[t] = sum[sets.find(same[mesh.triangles[t].x])];
+    return result;
+}
+
+// Area class of the slides' "additional classification by triangle area": a factor of 4 each.
+int areaClass(double area) { return int(std::floor(0.5 * std::log2(std::max(area, 1e-30)))); }
+
+struct StratumKey {
+    bool double_sided, masked;
+    int patch_class, triangle_class;
+    bool operator<(const StratumKey& o) const {
+        return std::tie(double_sided, masked, patch_class, triangle_class) <
+               std::tie(o.double_sided, o.masked, o.patch_class, o.triangle_class);
+    }
+};
+
+// Numbers the strata: one a key, the sparsest merged into a neighbour until they are few.
+std::map<StratumKey, uint8_t> chooseStrata(const std::map<StratumKey, uint32_t>& histogram, size_t n_triangles) {
+    struct Entry {
+        uint32_t count;
+        std::vector<StratumKey> keys;
+    };
+    std::vector<Entry> entries;
+    for (const auto& [key, count] : histogram) entries.push_back({count, {key}});
+    const auto mergeable = [](const Entry& a, const Entry& b) {
+        return a.keys[0].double_sided == b.keys[0].double_sided && a.keys[0].masked == b.keys[0].masked;
+    };
+    while (entries.size() > 1) {
+        size_t best = entries.size();
+        for (size_t i = 0; i + 1 < entries.size(); ++i) {
+            if (!mergeable(entries[i], entries[i + 1])) continue;
+            if (best == entries.size() || entries[i].count + entries[i + 1].count <
+                                              entries[best].count + entries[best + 1].count) {
+                best = i;
+            }
+        }
+        if (best == entries.size()) break;
+        const uint32_t smaller = std::min(entries[best].count, entries[best + 1].count);
+        if (entries.size() <= size_t(kMaxStrata) && smaller * 20 > n_triangles) break;
+        entries[best].count += entries[best + 1].count;
+        auto& keys = entries[best].keys;
+        keys.insert(keys.end(), entries[best + 1].keys.begin(), entries[best + 1].keys.end());
+        entries.erase(entries.begin() + best + 1);
+    }
+    std::map<StratumKey, uint8_t> result;
+    for (size_t i = 0; i < entries.size(); ++i) {
+        for (const StratumKey& key : entries[i].keys) result[key] = uint8_t(i);
+    }
+    return result;
+}
+
+class OctreeBuilder {
+public:
+    OctreeBuilder(Mesh& mesh, const std::vector<uint64_t>& codes) : mesh_(mesh), codes_(codes) {}
+
+    void build() {
+        mesh_.nodes.clear();
+        mesh_.nodes.push_back({});
+        const uint32_t n = uint32_t(mesh_.triangles.size());
+        const uint8_t first = n ? mesh_.triangle_stratum.front() : 0;
+        if (n == 0 || mesh_.triangle_stratum.back() == first) {
+            fill(0, 0, n, 0, first);
+            return;
+        }
+        // Several strata: the root's children are their roots.
+        std::vector<std::pair<uint32_t, uint32_t>> ranges;
+        for (uint32_t begin = 0; begin < n;) {
+            const uint8_t s = mesh_.triangle_stratum[begin];
+            uint32_t end = begin;
+            while (end < n && mesh_.triangle_stratum[end] == s) ++end;
+            ranges.emplace_back(begin, end);
+            begin = end;
+        }
+        const uint32_t first_child = addChildren(ranges.size());
+        for (size_t i = 0; i < ranges.size(); ++i) {
+            fill(first_child + uint32_t(i), ranges[i].first, ranges[i].second, 0,
+                 mesh_.triangle_stratum[ranges[i].first]);
+        }
+        finishInner(0, first_child, uint8_t(ranges.size()), 0, n, kMixedStratum);
+    }
+
+private:
+    uint32_t addChildren(size_t count) {
+        const uint32_t first = uint32_t(mesh_.nodes.size());
+        mesh_.nodes.resize(first + count);
+        return first;
+    }
+
+    void finishInner(uint32_t index, uint32_t first_child, uint8_t count, uint32_t begin, uint32_t end,
+                     uint8_t stratum) {
+        MeshNode node;
+        node.first_triangle = begin;
+        node.triangle_count = end - begin;
+        node.first_child = first_child;
+        node.child_count = count;
+        node.stratum = stratum;
+        for (uint32_t c = first_child; c < first_child + count; ++c) {
+            node.bounds.extend(mesh_.nodes[c].bounds);
+            node.max_triangle_area = std::max(node.max_triangle_area, mesh_.nodes[c].max_triangle_area);
+        }
+        node.area = mesh_.cumulative_area[end] - mesh_.cumulative_area[begin];
+        mesh_.nodes[index] = node;
+    }
+
+    // Makes nodes[index] the node over sorted triangles [begin, end), whose codes agree above `level`.
+    void fill(uint32_t index, uint32_t begin, uint32_t end, int level, uint8_t stratum) {
+        if (end - begin <= kLeafTriangles || level == kMortonLevels) {
+            MeshNode node;
+            node.first_triangle = begin;
+            node.triangle_count = end - begin;
+            node.stratum = stratum;
+            for (uint32_t t = begin; t < end; ++t) {
+                const UVec3& v = mesh_.triangles[t];
+                for (int k = 0; k < 3; ++k) node.bounds.extend(mesh_.positions[v[k]]);
+                node.max_triangle_area = std::max(
+                    node.max_triangle_area, float(mesh_.cumulative_area[t + 1] - mesh_.cumulative_area[t]));
+            }
+            node.area = mesh_.cumulative_area[end] - mesh_.cumulative_area[begin];
+            mesh_.nodes[index] = node;
+            return;
+        }
+        const int shift = 3 * (kMortonLevels - 1 - level);
+        std::vector<std::pair<uint32_t, uint32_t>> ranges;
+        for (uint32_t b = begin; b < end;) {
+            const uint64_t cell = codes_[b] >> shift;
+            uint32_t e = b;
+            while (e < end && codes_[e] >> shift == cell) ++e;
+            ranges.emplace_back(b, e);
+            b = e;
+        }
+        if (ranges.size() == 1) return fill(index, begin, end, level + 1, stratum);
+        const uint32_t first_child = addChildren(ranges.size());
+        for (size_t i = 0; i < ranges.size(); ++i) {
+            fill(first_child + uint32_t(i), ranges[i].first, ranges[i].second, level + 1, stratum);
+        }
+        finishInner(index, first_child, uint8_t(ranges.size()), begin, end, stratum);
+    }
+
+    Mesh& mesh_;
+    const std::vector<uint64_t>& codes_;
+};
+
+}  // namespace
+
+void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::string& where) {
+    checkArrays(mesh, materials.size(), where);
+
+    // Zero-area triangles cannot be seen; they would only upset the lists.
+    std::vector<double> areas;
+    size_t kept = 0;
+    for (size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const double area = triangleArea(mesh, mesh.triangles[t]);
+        if (!(area > 0.0)) continue;
+        if (!std::isfinite(area)) throw sceneError(where, "triangle " + std::to_string(t) + " has no finite area");
+        mesh.triangles[kept] = mesh.triangles[t];
+        mesh.triangle_material[kept++] = mesh.triangle_material[t];
+        areas.push_back(area);
+    }
+    mesh.triangles.resize(kept);
+    mesh.triangle_material.resize(kept);
+
+    const std::vector<double> patches = patchAreas(mesh, areas);
+    std::vector<StratumKey> keys(kept);
+    std::map<StratumKey, uint32_t> histogram;
+    for (size_t t = 0; t < kept; ++t) {
+        const Material& m = materials[mesh.triangle_material[t]];
+        keys[t] = {m.double_sided, m.alpha_mode != AlphaMode::kOpaque, areaClass(patches[t]), areaClass(areas[t])};
+        ++histogram[keys[t]];
+    }
+    const std::map<StratumKey, uint8_t> strata = chooseStrata(histogram, kept);
+
+    mesh.bounds = Box3();
+    for (const UVec3& t : mesh.triangles) {
+        for (int k = 0; k < 3; ++k) mesh.bounds.extend(mesh.positions[t[k]]);
+    }
+    const DVec3 extent = kept ? DVec3(mesh.bounds.extent()) : DVec3(1.0);
+    const double side = std::max({extent.x, extent.y, extent.z, 1e-30});
+
+    std::vector<uint64_t> codes(kept);
+    std::vector<uint8_t> stratum(kept);
+    for (size_t t = 0; t < kept; ++t) {
+        const UVec3& v = mesh.triangles[t];
+        const DVec3 centroid = (DVec3(mesh.positions[v.x]) + DVec3(mesh.positions[v.y]) + DVec3(mesh.positions[v.z])) / 3.0;
+        codes[t] = mortonCode(centroid, DVec3(mesh.bounds.min), side);
+        stratum[t] = strata.at(keys[t]);
+    }
+    std::vector<uint32_t> order(kept);
+    std::iota(order.begin(), order.end(), 0u);
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        return std::tie(stratum[a], codes[a], a) < std::tie(stratum[b], codes[b], b);
+    });
+    const auto permuted = [&](const auto& v) {
+        auto r = v;
+        for (size_t i = 0; i < kept; ++i) r[i] = v[order[i]];
+        return r;
+    };
+    mesh.triangles = permuted(mesh.triangles);
+    mesh.triangle_material = permuted(mesh.triangle_material);
+    codes = permuted(codes);
+    areas = permuted(areas);
+    mesh.triangle_stratum = permuted(stratum);
+    const std::vector<double> sorted_patches = permuted(patches);
+    const std::vector<StratumKey> sorted_keys = permuted(keys);
+
+    mesh.max_patch_area = 0.0f;
+    mesh.cumulative_area.assign(kept + 1, 0.0);
+    mesh.strata.assign(kept ? mesh.triangle_stratum.back() + 1u : 1u, {});
+    std::vector<double> stratum_area(mesh.strata.size(), 0.0), stratum_patch(mesh.strata.size(), 0.0);
+    for (size_t t = 0; t < kept; ++t) {
+        mesh.cumulative_area[t + 1] = mesh.cumulative_area[t] + areas[t];
+        const uint8_t s = mesh.triangle_stratum[t];
+        Stratum& out = mesh.strata[s];
+        out.max_triangle_area = std::max(out.max_triangle_area, float(areas[t]));
+        out.double_sided = sorted_keys[t].double_sided;
+        out.masked = sorted_keys[t].masked;
+        stratum_area[s] += areas[t];
+        stratum_patch[s] += areas[t] * sorted_patches[t];
+    }
+    for (size_t s = 0; s < mesh.strata.size(); ++s) {
+        if (stratum_area[s] > 0.0) mesh.strata[s].patch_area = float(stratum_patch[s] / stratum_area[s]);
+        mesh.max_patch_area = std::max(mesh.max_patch_area, mesh.strata[s].patch_area);
+    }
+    mesh.area = mesh.cumulative_area.back();
+    OctreeBuilder(mesh, codes).build();
+}
+
+size_t Mesh::bytes() const {
+    return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) + uvs.size() * sizeof(Vec2) +
+           colors.size() * sizeof(Vec4) + triangles.size() * (sizeof(UVec3) + sizeof(uint16_t) + sizeof(uint8_t)) +
+           nodes.size() * sizeof(MeshNode) + cumulative_area.size() * sizeof(double);
+}
+
+}  // namespace stipple

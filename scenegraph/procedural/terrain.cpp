@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <core/error.h>
+#include <core/rng.h>
+#include <scenegraph/procedural/generators.h>
+#include <scenegraph/procedural/noise.h>
+
+namespace stipple {
+
+namespace {
+
+enum class TerrainStyle { kMeadow, kForestFloor, kMountain };
+
+TerrainStyle terrainStyle(const std::string& name) {
+    if (name == "meadow") return TerrainStyle::kMeadow;
+    if (name == "forest_floor") return TerrainStyle::kForestFloor;
+    if (name == "mountain") return TerrainStyle::kMountain;
+    throw Error(ErrorCode::kInvalidArgument, "",
+                "unknown terrain style '" + name + "' (meadow, forest_floor or mountain)");
+}
+
+void check(const TerrainParams& params) {
+    if (params.resolution < 2 || params.resolution > 16385) {
+        throw Error(ErrorCode::kInvalidArgument, "", "a terrain's resolution must be in 2..16385");
+    }
+    if (!(params.size > 0.0 && params.size <= 1e7 && params.relief >= 0.0 && params.relief <= 1e5 &&
+          params.feature_size >= 1e-3 && params.feature_size <= 1e7)) {
+        throw Error(ErrorCode::kInvalidArgument, "",
+                    "a terrain's size, relief and feature_size must be positive and at most 1e7, "
+                    "1e5 and 1e7 metres");
+    }
+}
+
+// Sum of octaves in which steep places get less of the finer ones: smooth slopes and rough crests
+// and hollows, as erosion leaves them. Based on: Quilez. Value noise derivatives. 2008. In about
+// [-1, 1].
+double erodedNoise(uint64_t key, DVec2 p, int octaves) {
+    double sum = 0.0, height = 0.5;
+    DVec2 slope(0.0);
+    for (int i = 0; i < octaves; ++i) {
+        const NoiseSample n = gradientNoise(key + uint64_t(i), p);
+        slope += n.derivative * 0.5;
+        sum += height * n.value / (1.0 + glm::dot(slope, slope));
+        height *= 0.5;
+        p = DVec2(1.6 * p.x + 1.2 * p.y, -1.2 * p.x + 1.6 * p.y);  // twice as fine, turned
+    }
+    return sum;
+}
+
+// Crests and valleys: octaves of 1 - |noise| with the crest a little rounded, finer ones only on
+// the crests of the coarser ones. In about [0, 1]. Based on: Musgrave, Kolb, Mace. The Synthesis
+// and Rendering of Eroded Fractal Terrains. 1989.
+double ridgedNoise(uint64_t key, DVec2 p, int octaves) {
+    double sum = 0.0, height = 0.6, weight = 1.0;
+    for (int i = 0; i < octaves; ++i) {
+        const double n = gradientNoise(key + uint64_t(i), p).value;
+        const double ridge = 1.0 - std::sqrt(n * n + 0.0016);
+        const double signal = ridge * ridge * weight;
+        sum += height * signal;
+        weight = std::clamp(1.5 * signal, 0.0, 1.0);
+        height *= 0.42;
+        p = DVec2(1.6 * p.x + 1.2 * p.y, -1.2 * p.x + 1.6 * p.y);
+    }
+    return sum;
+}
+
+// Heights of about 1 between low and high; p in units of the largest hills.
+double rawHeight(TerrainStyle style, uint64_t key, const DVec2& p, int octaves) {
+    // Domain warping bends crests and valleys.
+    const int warp_octaves = std::min(octaves, 2);
+    const DVec2 bend(fractalNoise(key + 1000, p * 0.9, warp_octaves),
+                     fractalNoise(key + 2000, p * 0.9, warp_octaves));
+    const DVec2 warped = p + 0.2 * bend;
+    if (style != TerrainStyle::kMountain) return erodedNoise(key, warped, octaves);
+    return 0.8 * ridgedNoise(key + 3000, warped, std::min(octaves, 4)) +
+           0.5 * erodedNoise(key, warped * 1.3, octaves);
+}
+
+DVec3 groundColor(TerrainStyle style, uint64_t key, const DVec2& p, double relative_height,
+                  double slope, double hollow) {
+    const double patches = fractalNoise(key, p / 45.0, 4),
+                 fine = fractalNoise(key + 50, p / 3.5, 3);
+    const DVec3 rock = DVec3(0.27, 0.25, 0.225) * (1.0 + 0.3 * fine + 0.2 * patches);
+    DVec3 color;
+    double rock_slope = radians(36.0);
+    if (style == TerrainStyle::kMeadow) {
+        color = glm::mix(DVec3(0.105, 0.165, 0.035), DVec3(0.16, 0.195, 0.055),
+                         smoothStep(-0.5, 0.5, patches + 0.5 * fine));
+        color = glm::mix(color, DVec3(0.2, 0.165, 0.085),
+                         0.75 * smoothStep(0.25, 0.6, patches - 0.6 * hollow + 0.35 * fine));
+        color = glm::mix(color, DVec3(0.07, 0.13, 0.03), 0.7 * smoothStep(0.1, 0.8, hollow));
+    } else if (style == TerrainStyle::kForestFloor) {
+        color = glm::mix(DVec3(0.1, 0.072, 0.042), DVec3(0.155, 0.11, 0.065),
+                         smoothStep(-0.4, 0.4, fine));
+        color = glm::mix(color, DVec3(0.07, 0.105, 0.03),
+                         0.85 * smoothStep(-0.1, 0.35, patches + 0.6 * fine + 0.3 * hollow));
+    } else {
+        rock_slope = radians(30.0);
+        const DVec3 grass = glm::mix(DVec3(0.1, 0.125, 0.045), DVec3(0.17, 0.15, 0.075),
+                                     smoothStep(0.1, 0.5, relative_height + 0.3 * patches));
+        const DVec3 scree = DVec3(0.24, 0.225, 0.2) * (1.0 + 0.25 * fine);
+        color = glm::mix(grass, scree,
+                         smoothStep(0.35, 0.55, relative_height + 0.2 * patches - 0.15 * hollow));
+    }
+    color *= 1.0 + 0.22 * fine + 0.12 * patches;
+    color = glm::mix(
+        color, rock,
+        smoothStep(rock_slope - 0.12, rock_slope + 0.12, slope + 0.12 * patches + 0.1 * fine));
+    if (style == TerrainStyle::kMountain) {
+        // Snow lies high up and where it is not too steep, deeper in hollows.
+        const double snow =
+            smoothStep(0.56, 0.68, relative_height + 0.1 * patches + 0.05 * fine + 0.12 * hollow) *
+            smoothStep(radians(58.0), radians(44.0), slope + 0.1 * fine);
+        color = glm::mix(color, DVec3(0.84, 0.87, 0.91), snow);
+    }
+    return color * (1.0 - 0.25 * std::clamp(hollow, -0.4, 1.0));
+}
+
+}  // namespace
+
+double HeightField::height(double x, double z) const {
+    const double last = double(resolution - 1);
+    const double u = std::clamp((x / size + 0.5) * last, 0.0, last),
+                 v = std::clamp((z / size + 0.5) * last, 0.0, last);
+    const int i = std::min(int(u), resolution - 2), j = std::min(int(v), resolution - 2);
+    const double fu = u - i, fv = v - j;
+    const float* row = heights.data() + size_t(j) * size_t(resolution) + size_t(i);
+    const double near = row[0] + fu * (double(row[1]) - row[0]);
+    row += resolution;
+    const double far = row[0] + fu * (double(row[1]) - row[0]);
+    return near + fv * (far - near);
+}
+
+Vec3 HeightField::normal(double x, double z) const {
+    const double step = size / double(resolution - 1);
+    const double half = 0.5 * size;
+    // Differences over what lies within the border.
+    const double x0 = std::clamp(x - step, -half, half - step),
+                 x1 = std::clamp(x + step, -half + step, half);
+    const double z0 = std::clamp(z - step, -half, half - step),
+                 z1 = std::clamp(z + step, -half + step, half);
+    const double dx = (height(x1, z) - height(x0, z)) / (x1 - x0),
+                 dz = (height(x, z1) - height(x, z0)) / (z1 - z0);
+    return Vec3(glm::normalize(DVec3(-dx, 1.0, -dz)));
+}
+
+HeightField makeHeightField(const TerrainParams& params) {
+    check(params);
+    const TerrainStyle style = terrainStyle(params.style);
+    HeightField field;
+    field.resolution = params.resolution;
+    field.size = params.size;
+    const size_t n = size_t(params.resolution);
+    field.heights.resize(n * n);
+    const double step = params.size / double(n - 1);
+    // Down to waves of 3 samples.
+    const int octaves =
+        std::clamp(int(std::log2(std::max(params.feature_size / (3.0 * step), 1.0))) + 1, 1, 10);
+    const uint64_t key = hashCombine(params.seed, 0x7e44);
+    float low = kInfinity, high = -kInfinity;
+    for (size_t j = 0; j < n; ++j) {
+        for (size_t i = 0; i < n; ++i) {
+            const DVec2 p(-0.5 * params.size + double(i) * step,
+                          -0.5 * params.size + double(j) * step);
+            const float h = float(rawHeight(style, key, p / params.feature_size, octaves));
+            field.heights[j * n + i] = h;
+            low = std::min(low, h), high = std::max(high, h);
+        }
+    }
+    const float scale = high > low ? float(params.relief) / (high - low) : 0.0f;
+    for (float& h : field.heights) h = (h - low) * scale;
+    return field;
+}
+
+GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field) {
+    check(params);
+    const TerrainStyle style = terrainStyle(params.style);
+    const uint64_t key = hashCombine(params.seed, 0x7e45);
+    GeneratedMesh result;
+    Mesh& mesh = result.mesh;
+    mesh.name = "terrain";
+    const int n = field.resolution;
+    const size_t count = size_t(n) * size_t(n);
+    mesh.positions.reserve(count);
+    mesh.normals.reserve(count);
+    mesh.colors.reserve(count);
+    float low = kInfinity, high = -kInfinity;
+    for (const float h : field.heights) low = std::min(low, h), high = std::max(high, h);
+    const double step = field.size / double(n - 1);
+    const int reach = std::max(1, int(6.0 / step));  // samples: hollows are judged over some metres
+    const auto sample = [&](int i, int j) {
+        return double(field.heights[size_t(std::clamp(j, 0, n - 1)) * size_t(n) +
+                                    size_t(std::clamp(i, 0, n - 1))]);
+    };
+    for (int j = 0; j < n; ++j) {
+        for (int i = 0; i < n; ++i) {
+            const double x = -0.5 * field.size + i * step, z = -0.5 * field.size + j * step,
+                         y = sample(i, j);
+            const double dx = (sample(i + 1, j) - sample(i - 1, j)) /
+                              (step * (std::min(i + 1, n - 1) - std::max(i - 1, 0)));
+            const double dz = (sample(i, j + 1) - sample(i, j - 1)) /
+                              (step * (std::min(j + 1, n - 1) - std::max(j - 1, 0)));
+            const DVec3 normal = glm::normalize(DVec3(-dx, 1.0, -dz));
+            const double around = 0.25 * (sample(i - reach, j) + sample(i + reach, j) +
+                                          sample(i, j - reach) + sample(i, j + reach));
+            const double hollow = 4.0 * (around - y) / (reach * step);
+            const double relative_height = high > low ? (y - low) / (high - low) : 0.0;
+            const DVec3 color = groundColor(style, key, DVec2(x, z), relative_height,
+                                            std::acos(std::min(normal.y, 1.0)), hollow);
+            mesh.positions.push_back(Vec3(DVec3(x, y, z)));
+            mesh.normals.push_back(Vec3(normal));
+            mesh.colors.push_back(Vec4(Vec3(glm::clamp(color, DVec3(0.0), DVec3(1.0))), 1.0f));
+        }
+    }
+    mesh.triangles.reserve(2 * size_t(n - 1) * size_t(n - 1));
+    for (int j = 0; j + 1 < n; ++j) {
+        for (int i = 0; i + 1 < n; ++i) {
+            const uint32_t a = uint32_t(j) * uint32_t(n) + uint32_t(i), b = a + 1,
+                           c = a + uint32_t(n), d = c + 1;
+            mesh.triangles.push_back(UVec3(a, c, b));
+            mesh.triangles.push_back(UVec3(b, c, d));
+        }
+    }
+    mesh.triangle_material.assign(mesh.triangles.size(), 0);
+    Material material;
+    material.name = "ground";
+    material.base_color = Vec3(1.0f);
+    result.materials.push_back(material);
+    return result;
+}
+
+}  // namespace stipple

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+// The settings table: every member of RenderSettings has one entry here, and nothing else knows its name, range or text form.
+#include <core/nearest_name.h>
+#include <core/settings.h>
+
+#include <charconv>
+#include <cmath>
+#include <functional>
+
+namespace stipple {
+
+namespace {
+
+struct Entry {
+    SettingInfo info;
+    std::function<bool(RenderSettings&, const std::string&)> set;  // false: not an allowed value
+    std::function<std::string(const RenderSettings&)> get;
+};
+
+template <class T>
+std::string textOf(T value) {
+    char buffer[32];
+    return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
+}
+
+template <class T>
+bool parseNumber(const std::string& text, T& value) {
+    const char* end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, value);
+    return error == std::errc() && rest == end;
+}
+
+template <class T>
+Entry number(const char* key, T RenderSettings::*member, T lo, T hi, const char* unit,
+             const char* help, bool has_option = true) {
+    return {{key, textOf(lo) + ".." + textOf(hi), unit, help, has_option},
+            [=](RenderSettings& settings, const std::string& text) {
+                T value{};
+                // note: written so that NaN fails as well.
+                if (!parseNumber(text, value) || !(value >= lo && value <= hi)) return false;
+                settings.*member = value;
+                return true;
+            },
+            [=](const RenderSettings& settings) { return textOf(settings.*member); }};
+}
+
+template <class T>
+struct Choice {
+    const char* name;
+    T value;
+};
+
+template <class T>
+Entry choice(const char* key, T RenderSettings::*member, std::vector<Choice<T>> choices,
+             const char* help, bool has_option = true) {
+    std::string values;
+    for (const Choice<T>& c : choices) values += (values.empty() ? "" : "|") + std::string(c.name);
+    return {{key, values, "", help, has_option},
+            [=](RenderSettings& settings, const std::string& text) {
+                for (const Choice<T>& c : choices) {
+                    if (text != c.name) continue;
+                    settings.*member = c.value;
+                    return true;
+                }
+                return false;
+            },
+            [=](const RenderSettings& settings) {
+                for (const Choice<T>& c : choices) {
+                    if (settings.*member == c.value) return std::string(c.name);
+                }
+                return std::string();
+            }};
+}
+
+Entry onOff(const char* key, bool RenderSettings::*member, const char* help,
+            bool has_option = true) {
+    return choice<bool>(key, member, {{"on", true}, {"off", false}}, help, has_option);
+}
+
+// "off" is another name for 0 megabytes.
+Entry cacheMb() {
+    Entry entry = number("cache_mb", &RenderSettings::cache_mb, 0, 1 << 24, "MB",
+                         "memory for point lists that later frames use again");
+    entry.info.values += "|off";
+    entry.set = [set = entry.set](RenderSettings& settings, const std::string& text) {
+        return set(settings, text == "off" ? "0" : text);
+    };
+    return entry;
+}
+
+std::vector<Entry> makeEntries() {
+    using S = RenderSettings;
+    constexpr bool kOnlySet = false;
+    return {
+        number("width", &S::width, 1, 65536, "pixels", "width of the picture"),
+        number("height", &S::height, 1, 65536, "pixels", "height of the picture"),
+        choice<Method>("method", &S::method,
+                       {{"points", Method::kPoints},
+                        {"zbuffer", Method::kZBuffer},
+                        {"raycast", Method::kRaycast}},
+                       "how what is visible is found; zbuffer draws every triangle, raycast is "
+                       "the reference"),
+        number("samples", &S::samples, 0.001, 10000.0, "",
+               "K, expected points per subpixel of exactly projected area; with raycast, rays a "
+               "pixel"),
+        number("subpixels", &S::subpixels, 1, 16, "subpixels",
+               "subpixels along one side of a pixel"),
+        choice<Sampler>("sampler", &S::sampler,
+                        {{"stratified", Sampler::kStratified}, {"random", Sampler::kRandom}},
+                        "how points are spread over a node's area"),
+        choice<Reconstruct>("reconstruct", &S::reconstruct,
+                            {{"per-pixel", Reconstruct::kPerPixel},
+                             {"splat", Reconstruct::kSplat},
+                             {"gaussian", Reconstruct::kGaussian}},
+                            "how points become a picture"),
+        number("splat_size", &S::splat_size, 0.1, 64.0, "pixels",
+               "side of a splat, or two standard deviations of a gaussian"),
+        onOff("shadows", &S::shadows, "shadows of the suns"),
+        onOff("ao", &S::ao, "ambient occlusion"),
+        number("seed", &S::seed, uint64_t(0), ~uint64_t(0), "",
+               "the same seed gives the same picture, bit for bit"),
+        number("threads", &S::threads, 0, 1024, "threads", "worker threads; 0 is one a core"),
+        cacheMb(),
+        number("cut_ratio", &S::cut_ratio, 1.01, 100.0, "",
+               "largest ratio of depths within a node of the cut", kOnlySet),
+        number("area_threshold", &S::area_threshold, 0.0, 1e9, "subpixels",
+               "triangles of more than this projected area go to the z-buffer", kOnlySet),
+        number("list_length", &S::list_length, 1, 1 << 24, "points",
+               "most points taken from a node's list before the node is opened", kOnlySet),
+        onOff("culling", &S::culling, "skip batches behind what a tile has already drawn",
+              kOnlySet),
+        onOff("fill", &S::fill, "per-pixel reconstruction removes hidden points and fills gaps",
+              kOnlySet),
+    };
+}
+
+const std::vector<Entry>& entries() {
+    static const std::vector<Entry> table = makeEntries();
+    return table;
+}
+
+const Entry& findEntry(const std::string& key, const std::string& where) {
+    std::vector<std::string> keys;
+    for (const Entry& entry : entries()) {
+        if (entry.info.key == key) return entry;
+        keys.push_back(entry.info.key);
+    }
+    const std::string nearest = nearestName(key, keys);
+    throw Error(ErrorCode::kInvalidArgument, where,
+                "unknown setting '" + key + "'" +
+                    (nearest.empty() ? "" : "; did you mean '" + nearest + "'?"));
+}
+
+}  // namespace
+
+const std::vector<SettingInfo>& settingsTable() {
+    static const std::vector<SettingInfo> table = [] {
+        std::vector<SettingInfo> infos;
+        for (const Entry& entry : entries()) infos.push_back(entry.info);
+        return infos;
+    }();
+    return table;
+}
+
+void applySetting(RenderSettings& settings, const std::string& key, const std::string& value,
+                  const std::string& where) {
+    const Entry& entry = findEntry(key, where);
+    if (entry.set(settings, value)) return;
+    throw Error(ErrorCode::kInvalidArgument, where,
+                "'" + value + "' is not a value of " + key + " (" + entry.info.values + ")");
+}
+
+std::string settingValue(const RenderSettings& settings, const std::string& key) {
+    return findEntry(key, "").get(settings);
+}
+
+}  // namespace stipple

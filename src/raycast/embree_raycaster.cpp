@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tracing and hit attributes. A scene without nested groups is traced in packets where rays are
+// coherent; elsewhere rays go one by one, and the user geometry's callback carries them into the
+// instanced group.
+#include <raycast/embree_raycaster.h>
+
+#include <core/rng.h>
+#include <raycast/embree_scenes.h>
+#include <scenegraph/object_id.h>
+#include <scenegraph/surface_at.h>
+
+#include <array>
+#include <bit>
+
+namespace stipple {
+
+namespace {
+
+constexpr size_t kPacket = 16;
+constexpr int kAllActive = -1;
+
+// Where a ray ended: the slots from the root down to the mesh, and the place on it.
+struct HitPlace {
+    int depth = 0;  // slots used
+    std::array<uint32_t, kMaxNesting> slots;
+    uint32_t geometry_id = 0;
+    uint32_t primitive_id = 0;
+    float u = 0.0f, v = 0.0f;
+};
+
+// What one call of Embree is about. Embree hands its address (as that of the context) to the
+// callbacks.
+struct Level {
+    RTCIntersectContext embree;         // first, so that the addresses are the same
+    const GroupScene* group = nullptr;  // the one traced
+    const Level* parent = nullptr;      // the level from which the ray came here ...
+    uint32_t slot = 0;                  // ... and through which of its instances
+    int depth = 0;
+    // The ray in double, in the group's space: rounding errors must not add up on the way down.
+    // Nested scenes only.
+    DVec3 origin = DVec3(0.0);
+    DVec3 direction = DVec3(0.0);
+    const Ray* rays = nullptr;       // by the ray's id: as the caller gave them
+    HitPlace* nested_hit = nullptr;  // nearest hit below any group instance
+};
+
+Level makeLevel(const GroupScene& group, RTCIntersectContextFlags flags) {
+    Level level;
+    rtcInitIntersectContext(&level.embree);
+    level.embree.flags = flags;
+    level.group = &group;
+    return level;
+}
+
+// Whether a blended surface is there for this ray: a pure function of the ray and the place.
+bool isThere(float alpha, const Ray& ray, const Level& level, uint32_t instance_id,
+             uint32_t triangle) {
+    const auto bits = [](float f) { return uint64_t(std::bit_cast<uint32_t>(f)); };
+    uint64_t key = hashCombine(bits(ray.origin.x), bits(ray.origin.y), bits(ray.origin.z),
+                               bits(ray.direction.x), bits(ray.direction.y), bits(ray.direction.z));
+    for (const Level* l = &level; l->parent; l = l->parent) key = hashCombine(key, l->slot);
+    return uniformFloat(hashCombine(key, instance_id, triangle)) < alpha;
+}
+
+// Refuses candidate hits on what is not there. Ray and hit are in the mesh's space.
+void filterHit(const RTCFilterFunctionNArguments* args) {
+    const MeshPart& part = *static_cast<const MeshPart*>(args->geometryUserPtr);
+    const Level& level = *reinterpret_cast<const Level*>(args->context);
+    const Scene& scene = *part.scene;
+    for (unsigned i = 0; i < args->N; ++i) {
+        if (args->valid[i] != kAllActive) continue;
+        const uint32_t triangle = part.first_triangle + RTCHitN_primID(args->hit, args->N, i);
+        const Material& material = scene.materials[part.mesh->triangle_material[triangle]];
+        if (!material.double_sided) {
+            const Vec3 direction(RTCRayN_dir_x(args->ray, args->N, i),
+                                 RTCRayN_dir_y(args->ray, args->N, i),
+                                 RTCRayN_dir_z(args->ray, args->N, i));
+            const Vec3 normal(RTCHitN_Ng_x(args->hit, args->N, i),
+                              RTCHitN_Ng_y(args->hit, args->N, i),
+                              RTCHitN_Ng_z(args->hit, args->N, i));
+            if (glm::dot(direction, normal) > 0.0f) {
+                args->valid[i] = 0;
+                continue;
+            }
+        }
+        if (material.alpha_mode == AlphaMode::kOpaque) continue;
+        const float alpha =
+            alphaAt(*part.mesh, scene.materials, scene.textures, triangle,
+                    RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i));
+        const bool there = material.alpha_mode == AlphaMode::kMask
+                               ? alpha >= material.alpha_cutoff
+                               : isThere(alpha, level.rays[RTCRayN_id(args->ray, args->N, i)],
+                                         level, RTCHitN_instID(args->hit, args->N, i, 0), triangle);
+        if (!there) args->valid[i] = 0;
+    }
+}
+
+RTCRayHit makeRayHit(const Vec3& origin, const Vec3& direction, float t_min, float t_max,
+                     uint32_t id) {
+    RTCRayHit r;
+    r.ray = {origin.x,    origin.y, origin.z, t_min, direction.x, direction.y,
+             direction.z, 0.0f,     t_max,    ~0u,   id,          0};
+    r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    return r;
+}
+
+// A hit without an instance came out of the user geometry, which has stored its place.
+bool isNested(const RTCHit& hit) { return hit.instID[0] == RTC_INVALID_GEOMETRY_ID; }
+
+// The place of a hit on a mesh of the level's own group.
+HitPlace placeOf(const Level& level, uint32_t instance_id, uint32_t geometry_id,
+                 uint32_t primitive_id, float u, float v) {
+    HitPlace place;
+    place.depth = level.depth + 1;
+    place.slots[level.depth] = level.group->meshSlot(instance_id);
+    for (const Level* l = &level; l->parent; l = l->parent) place.slots[l->depth - 1] = l->slot;
+    place.geometry_id = geometry_id;
+    place.primitive_id = primitive_id;
+    place.u = u;
+    place.v = v;
+    return place;
+}
+
+// Carries a ray into a group instance. t means the same there: the direction is transformed, not
+// normalized.
+void intersectGroup(const RTCIntersectFunctionNArguments* args) {
+    if (args->valid[0] != kAllActive)
+        return;  // N is 1: scenes with nested groups are not traced in packets
+    const GroupScene& parent = *static_cast<const GroupScene*>(args->geometryUserPtr);
+    const Level& outer_level = *reinterpret_cast<const Level*>(args->context);
+    RTCRayHit& outer = *reinterpret_cast<RTCRayHit*>(args->rayhit);
+
+    const uint32_t slot = parent.groupSlot(args->primID);
+    const GroupScene& child = parent.scenes->groups[parent.group->instances.child(slot).index()];
+    const Affine child_from_parent = inverse(parent.groupFromChild(slot));
+    Level level = makeLevel(child, outer_level.embree.flags);
+    level.parent = &outer_level;
+    level.slot = slot;
+    level.depth = outer_level.depth + 1;
+    level.origin = child_from_parent.point(outer_level.origin);
+    level.direction = child_from_parent.linear * outer_level.direction;
+    level.rays = outer_level.rays;
+    level.nested_hit = outer_level.nested_hit;
+
+    RTCRayHit inner = makeRayHit(Vec3(level.origin), Vec3(level.direction), outer.ray.tnear,
+                                 outer.ray.tfar, outer.ray.id);
+    rtcIntersect1(child.handle.get(), &level.embree, &inner);
+    if (inner.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+    if (!isNested(inner.hit)) {
+        *level.nested_hit = placeOf(level, inner.hit.instID[0], inner.hit.geomID, inner.hit.primID,
+                                    inner.hit.u, inner.hit.v);
+    }
+    outer.ray.tfar = inner.ray.tfar;
+    outer.hit = inner.hit;
+    outer.hit.geomID = args->geomID;
+    outer.hit.primID = args->primID;
+    outer.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+}
+
+bool isTraceable(const Ray& ray) {
+    return isFinite(DVec3(ray.origin)) && isFinite(DVec3(ray.direction)) && ray.t_min >= 0.0f;
+}
+
+// Packets pay where rays go through the same nodes.
+bool areCoherent(const Ray* rays, size_t count) {
+    const Vec3& first = rays[0].direction;
+    const float length2 = glm::dot(first, first);
+    for (size_t i = 1; i < count; ++i) {
+        const Vec3& d = rays[i].direction;
+        const float along = glm::dot(first, d);
+        if (!(along > 0.0f && along * along > 0.99f * length2 * glm::dot(d, d))) return false;
+    }
+    return true;
+}
+
+class EmbreeRayCaster : public RayCaster {
+public:
+    EmbreeRayCaster(const Scene& scene, const DVec3& origin_world, int n_threads)
+        : scenes_(scene, origin_world, n_threads, TraceCallbacks{filterHit, intersectGroup}) {}
+
+    void cast(const Ray* rays, size_t count, RayHit* hits, float footprint_per_t) const override {
+        const bool packets = !scenes_.root().has_groups;
+        for (size_t begin = 0; begin < count; begin += kPacket) {
+            const size_t n = std::min(kPacket, count - begin);
+            if (packets && n == kPacket && areCoherent(rays + begin, n)) {
+                castPacket(rays + begin, hits + begin, footprint_per_t);
+            } else {
+                for (size_t i = begin; i < begin + n; ++i)
+                    castOne(rays[i], hits[i], footprint_per_t);
+            }
+        }
+    }
+
+    size_t bytes() const override { return scenes_.bytes(); }
+
+private:
+    void castOne(const Ray& ray, RayHit& hit, float footprint_per_t) const {
+        hit = RayHit();
+        if (!isTraceable(ray)) return;
+        HitPlace place;
+        Level level = makeLevel(scenes_.root(), RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+        level.origin = DVec3(ray.origin);
+        level.direction = DVec3(ray.direction);
+        level.rays = &ray;
+        level.nested_hit = &place;
+        RTCRayHit r = makeRayHit(ray.origin, ray.direction, ray.t_min, ray.t_max, 0);
+        rtcIntersect1(scenes_.root().handle.get(), &level.embree, &r);
+        if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+        if (!isNested(r.hit))
+            place = placeOf(level, r.hit.instID[0], r.hit.geomID, r.hit.primID, r.hit.u, r.hit.v);
+        hit = attributesAt(place, r.ray.tfar, footprint_per_t);
+    }
+
+    void castPacket(const Ray* rays, RayHit* hits, float footprint_per_t) const {
+        RTCRayHit16 r;
+        alignas(64) int valid[kPacket];
+        for (unsigned i = 0; i < kPacket; ++i) {
+            valid[i] = isTraceable(rays[i]) ? kAllActive : 0;
+            r.ray.org_x[i] = rays[i].origin.x;
+            r.ray.org_y[i] = rays[i].origin.y;
+            r.ray.org_z[i] = rays[i].origin.z;
+            r.ray.tnear[i] = rays[i].t_min;
+            r.ray.dir_x[i] = rays[i].direction.x;
+            r.ray.dir_y[i] = rays[i].direction.y;
+            r.ray.dir_z[i] = rays[i].direction.z;
+            r.ray.time[i] = 0.0f;
+            r.ray.tfar[i] = rays[i].t_max;
+            r.ray.mask[i] = ~0u;
+            r.ray.id[i] = i;
+            r.ray.flags[i] = 0;
+            r.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+            r.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+        }
+        Level level = makeLevel(scenes_.root(), RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+        level.rays = rays;
+        rtcIntersect16(valid, scenes_.root().handle.get(), &level.embree, &r);
+        for (size_t i = 0; i < kPacket; ++i) {
+            hits[i] = RayHit();
+            if (r.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+            hits[i] = attributesAt(placeOf(level, r.hit.instID[0][i], r.hit.geomID[i],
+                                           r.hit.primID[i], r.hit.u[i], r.hit.v[i]),
+                                   r.ray.tfar[i], footprint_per_t);
+        }
+    }
+
+    RayHit attributesAt(const HitPlace& place, float t, float footprint_per_t) const {
+        const Scene& scene = *scenes_.scene;
+        DMat3 world_from_object(1.0);
+        uint64_t path = 0;
+        ChildRef child = ChildRef::group(scene.root);
+        for (int i = 0; i < place.depth; ++i) {
+            const Group& group = scene.groups[child.index()];
+            const uint32_t slot = place.slots[i];
+            world_from_object = world_from_object * group.instances.groupFromChild(slot).linear;
+            path = extendObjectPath(path,
+                                    group.listed_index.empty() ? slot : group.listed_index[slot]);
+            child = group.instances.child(slot);
+        }
+        const MeshPart& part = scenes_.meshes[child.index()].parts[place.geometry_id];
+        const uint32_t triangle = part.first_triangle + place.primitive_id;
+
+        // The cofactor matrix is the inverse transpose times the determinant: area vectors grow by
+        // it.
+        const DMat3 area_scale = cofactor(world_from_object);
+        const double side = glm::determinant(world_from_object) < 0.0 ? -1.0 : 1.0;
+        const UVec3& v = part.mesh->triangles[triangle];
+        const DVec3 a(part.mesh->positions[v.x]), b(part.mesh->positions[v.y]),
+            c(part.mesh->positions[v.z]);
+        const DVec3 area_object = glm::cross(b - a, c - a);
+        const double length_scale =
+            std::sqrt(glm::length(area_scale * area_object) / glm::length(area_object));
+        const float footprint_object =
+            length_scale > 0.0 ? float(footprint_per_t * t / length_scale) : 0.0f;
+        const MeshSurface surface = surfaceAt(*part.mesh, scene.materials, scene.textures, triangle,
+                                              place.u, place.v, footprint_object);
+
+        RayHit hit;
+        hit.t = t;
+        hit.normal_world = Vec3(glm::normalize(area_scale * DVec3(surface.normal_object) * side));
+        hit.albedo = surface.albedo;
+        hit.material = part.mesh->triangle_material[triangle];
+        hit.object = objectId(path);
+        return hit;
+    }
+
+    EmbreeScenes scenes_;
+};
+
+}  // namespace
+
+std::unique_ptr<RayCaster> makeEmbreeRayCaster(const Scene& scene, const DVec3& origin_world,
+                                               int n_threads) {
+    return std::make_unique<EmbreeRayCaster>(scene, origin_world, n_threads);
+}
+
+}  // namespace stipple

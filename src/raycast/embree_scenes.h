@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scene graph as Embree scenes, one a mesh and one a group, never expanded: what
+// embree_raycaster.cpp traces. Private to this folder.
+#pragma once
+
+#include <scenegraph/scene.h>
+
+#include <embree3/rtcore.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace stipple {
+
+// Every level of user geometry takes stack while a ray is traced.
+inline constexpr int kMaxNesting = 64;
+
+// Embree's handles, released with their owner.
+struct ReleaseDevice {
+    void operator()(RTCDevice d) const { rtcReleaseDevice(d); }
+};
+struct ReleaseScene {
+    void operator()(RTCScene s) const { rtcReleaseScene(s); }
+};
+using DeviceHandle = std::unique_ptr<RTCDeviceTy, ReleaseDevice>;
+using SceneHandle = std::unique_ptr<RTCSceneTy, ReleaseScene>;
+
+// The device, what it reported and what it allocated. Embree calls back with its address: it stays
+// where it is.
+class EmbreeDevice {
+public:
+    // Throws kInternal. n_threads: for building (0: one a core).
+    explicit EmbreeDevice(int n_threads);
+
+    RTCDevice get() const { return device_.get(); }
+    size_t bytes() const { return size_t(std::max<int64_t>(bytes_, 0)); }
+    // Throws what Embree reported since the device was made: kOutOfMemory or kInternal.
+    void check() const;
+
+private:
+    static void onError(void* self, RTCError code, const char* message);
+    static bool onMemory(void* self, ssize_t bytes, bool after);
+
+    std::atomic<int64_t> bytes_{0};
+    mutable std::mutex mutex_;
+    RTCError error_ = RTC_ERROR_NONE;  // the first one
+    std::string message_;
+    DeviceHandle device_;
+};
+
+// A geometry of a mesh's scene: the triangles from first_triangle on, which need the hit filter or
+// do not.
+struct MeshPart {
+    const Scene* scene = nullptr;
+    const Mesh* mesh = nullptr;
+    uint32_t first_triangle = 0;
+};
+
+struct MeshScene {
+    SceneHandle handle;
+    std::vector<MeshPart> parts;  // by geometry id; not resized once Embree has their addresses
+};
+
+struct EmbreeScenes;
+
+// A group's scene: meshes are Embree instances, as Embree has one level of them; groups are the
+// primitives of one user geometry.
+struct GroupScene {
+    SceneHandle handle;
+    const EmbreeScenes* scenes = nullptr;
+    const Group* group = nullptr;
+    DVec3 origin = DVec3(0.0);  // subtracted from all translations: the eye for the root
+    // Instances of the group by geometry id (meshes) and by primitive id of the user geometry
+    // (groups). Empty: the same number.
+    std::vector<uint32_t> mesh_slots;
+    std::vector<uint32_t> group_slots;
+    uint32_t n_meshes = 0;  // instances of meshes
+    bool has_groups = false;
+    int height = 0;  // levels of groups from here down
+
+    Affine groupFromChild(uint32_t slot) const {
+        Affine a = group->instances.groupFromChild(slot);
+        a.translation -= origin;
+        return a;
+    }
+    uint32_t meshSlot(uint32_t geometry_id) const {
+        return mesh_slots.empty() ? geometry_id : mesh_slots[geometry_id];
+    }
+    uint32_t groupSlot(uint32_t primitive_id) const {
+        return group_slots.empty() ? primitive_id : group_slots[primitive_id];
+    }
+};
+
+// What the tracer adds: called for every candidate hit of parts that need it, and for every group
+// instance a ray meets.
+struct TraceCallbacks {
+    RTCFilterFunctionN filter_hit = nullptr;          // geometry user data: MeshPart
+    RTCIntersectFunctionN intersect_group = nullptr;  // geometry user data: GroupScene
+};
+
+struct EmbreeScenes {
+    const Scene* scene = nullptr;
+    EmbreeDevice device;
+    std::vector<MeshScene> meshes;  // both as in Scene; without a handle where the root shows none
+    std::vector<GroupScene> groups;
+
+    // Builds what the root shows, children before parents. Throws kOutOfMemory, kUnsupported
+    // (nested deeper than kMaxNesting), kInternal.
+    EmbreeScenes(const Scene& scene, const DVec3& origin_world, int n_threads,
+                 const TraceCallbacks& callbacks);
+
+    const GroupScene& root() const { return groups[scene->root]; }
+    size_t bytes() const;
+
+private:
+    void buildMesh(uint32_t index);
+    void buildGroup(uint32_t index, int level);
+    SceneHandle newScene();
+    void addInstance(GroupScene& out, uint32_t slot);
+
+    TraceCallbacks callbacks_;
+    DVec3 origin_world_;
+};
+
+}  // namespace stipple

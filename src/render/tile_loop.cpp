@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <render/tile_loop.h>
+
+#include <core/stopwatch.h>
+
+#include <algorithm>
+#include <mutex>
+
+namespace stipple {
+
+namespace {
+
+struct Tile {
+    SubpixelRect inner, outer;
+    std::vector<uint32_t> batches;  // front to back
+};
+
+std::vector<Tile> makeTiles(const View& view, int tile_subpixels, int halo) {
+    const int s = view.subpixels;
+    const int side = std::max(1, tile_subpixels / s) * s;
+    std::vector<Tile> tiles;
+    for (int y = 0; y < view.subHeight(); y += side) {
+        for (int x = 0; x < view.subWidth(); x += side) {
+            Tile tile;
+            tile.inner = {x, y, std::min(x + side, view.subWidth()), std::min(y + side, view.subHeight())};
+            tile.outer = {std::max(0, x - halo), std::max(0, y - halo), std::min(tile.inner.x1 + halo, view.subWidth()),
+                          std::min(tile.inner.y1 + halo, view.subHeight())};
+            tiles.push_back(std::move(tile));
+        }
+    }
+    return tiles;
+}
+
+void sortIntoTiles(const std::vector<Batch>& batches, const View& view, int tile_subpixels, int halo,
+                   std::vector<Tile>& tiles) {
+    std::vector<uint32_t> order(batches.size());
+    for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        return batches[a].z_min != batches[b].z_min ? batches[a].z_min < batches[b].z_min : a < b;
+    });
+    const int side = std::max(1, tile_subpixels / view.subpixels) * view.subpixels;
+    const int columns = (view.subWidth() + side - 1) / side, rows = (view.subHeight() + side - 1) / side;
+    for (const uint32_t b : order) {
+        const SubpixelRect& r = batches[b].rect;
+        const int x0 = std::max(0, (r.x0 - halo) / side), x1 = std::min(columns - 1, (r.x1 - 1 + halo) / side);
+        const int y0 = std::max(0, (r.y0 - halo) / side), y1 = std::min(rows - 1, (r.y1 - 1 + halo) / side);
+        for (int y = y0; y <= y1; ++y) {
+            for (int x = x0; x <= x1; ++x) {
+                Tile& tile = tiles[size_t(y) * columns + x];
+                if (tile.outer.overlaps(r)) tile.batches.push_back(b);
+            }
+        }
+    }
+}
+
+class NumberLookup : public SampleLookup {
+public:
+    NumberLookup(const TileEmitter* emitter, const TriangleLookup& triangles) : emitter_(emitter), triangles_(triangles) {}
+    void lookUp(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample) const override {
+        if (number & kZBufferBit) {
+            triangles_(number & ~kZBufferBit, sub_x, sub_y, sample);
+        } else {
+            emitter_->attributes(number, sub_x, sub_y, sample);
+        }
+    }
+
+private:
+    const TileEmitter* emitter_;
+    const TriangleLookup& triangles_;
+};
+
+// What a thread keeps from tile to tile.
+struct Worker {
+    std::unique_ptr<TileEmitter> emitter;
+    std::unique_ptr<TileReconstruction> reconstruction;
+    double draw_seconds = 0.0, finish_seconds = 0.0;
+    uint64_t culled = 0;
+};
+
+}  // namespace
+
+void drawTiles(const ReconstructionContext& context, PointSource* source, const std::vector<Batch>& batches,
+               const TriangleLookup& triangle_lookup, ThreadPool& pool, const FrameRequest& request, FrameStats& stats) {
+    const int halo = makeReconstruction(context)->halo();
+    std::vector<Tile> tiles = makeTiles(context.view, context.settings.tile_size, halo);
+    sortIntoTiles(batches, context.view, context.settings.tile_size, halo, tiles);
+
+    std::vector<Worker> workers(pool.threadCount());
+    std::atomic<size_t> done{0};
+    std::mutex progress_mutex;
+    pool.forEach(tiles.size(), [&](size_t t, int thread) {
+        if (request.cancel && request.cancel->requested) return;
+        Worker& worker = workers[thread];
+        if (!worker.reconstruction) {
+            worker.reconstruction = makeReconstruction(context);
+            if (source) worker.emitter = source->makeEmitter();
+        }
+        TileReconstruction& reconstruction = *worker.reconstruction;
+        const NumberLookup lookup(worker.emitter.get(), triangle_lookup);
+        const Tile& tile = tiles[t];
+
+        const Stopwatch draw_watch;
+        reconstruction.beginTile(tile.inner, tile.outer);
+        for (int pass = 0; pass < reconstruction.passCount(); ++pass) {
+            reconstruction.beginPass(pass, lookup);
+            for (const uint32_t b : tile.batches) {
+                if (reconstruction.hides(batches[b].rect, batches[b].z_min)) {
+                    worker.culled += pass == 0 ? uint64_t(batches[b].expected_points) : 0;
+                } else {
+                    worker.emitter->emit(batches[b], reconstruction);
+                }
+            }
+        }
+        worker.draw_seconds += draw_watch.seconds();
+        const Stopwatch finish_watch;
+        reconstruction.endTile(lookup);
+        if (worker.emitter) worker.emitter->forget();
+        worker.finish_seconds += finish_watch.seconds();
+
+        const size_t n = ++done;
+        if (request.progress && n % 16 == 0) {
+            const std::lock_guard lock(progress_mutex);
+            request.progress("draw", double(n) / double(tiles.size()));
+        }
+    });
+    if (request.cancel && request.cancel->requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
+
+    double draw = 0.0, finish = 0.0;
+    for (const Worker& worker : workers) {
+        if (!worker.reconstruction) continue;
+        const TileCounters counters = worker.reconstruction->counters();
+        stats.points_drawn += counters.points_drawn;
+        stats.points_kept += counters.points_kept;
+        stats.points_culled += worker.culled;
+        draw += worker.draw_seconds;
+        finish += worker.finish_seconds;
+    }
+    stats.batches = batches.size();
+    stats.phases.emplace_back("draw", draw / pool.threadCount());
+    stats.phases.emplace_back("reconstruct", finish / pool.threadCount());
+}
+
+}  // namespace stipple

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// `stipple info`: what is in a scene, as text or as JSON.
+#include <scenegraph/io/load.h>
+#include <tools/command_line.h>
+#include <tools/commands.h>
+#include <tools/json_number.h>
+#include <tools/signals.h>
+
+#include <cstdio>
+#include <iostream>
+
+namespace stipple {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const HelpText kHelp = {"stipple info SCENE [--json]",
+                        "Prints what is in a scene: instances, unique and expanded triangles, memory, groups with their "
+                        "depth, cameras and materials.",
+                        {"stipple info scenes/forest.scene.json", "stipple info tree.glb --json"}};
+
+Json boxJson(const DBox3& box) {
+    if (box.isEmpty()) return nullptr;
+    return {{"min", {box.min.x, box.min.y, box.min.z}}, {"max", {box.max.x, box.max.y, box.max.z}}};
+}
+
+Json infoJson(const Scene& scene, const std::vector<std::string>& warnings) {
+    const SceneSize size = sceneSize(scene);
+    Json json = {{"schema", 1},
+                 {"version", STIPPLE_VERSION},
+                 {"path", scene.path},
+                 {"instances", jsonCount(size.instances)},
+                 {"instances_stored", jsonCount(size.stored_instances)},
+                 {"triangles_unique", jsonCount(size.triangles_unique)},
+                 {"triangles_total", jsonCount(size.triangles_total)},
+                 {"bytes", size.bytes},
+                 {"instance_bytes", size.instance_bytes},
+                 {"bounds", boxJson(sceneBounds(scene))}};
+    json["groups"] = Json::array();
+    for (const Group& group : scene.groups) {
+        json["groups"].push_back({{"name", group.name},
+                                  {"root", &group == &scene.groups[scene.root]},
+                                  {"depth", group.depth},
+                                  {"instances_stored", group.instances.size()},
+                                  {"instances", jsonCount(group.instances_total)},
+                                  {"triangles", jsonCount(group.triangles_total)}});
+    }
+    json["assets"] = Json::array();
+    for (const Mesh& mesh : scene.meshes) {
+        json["assets"].push_back({{"name", mesh.name},
+                                  {"triangles", mesh.triangles.size()},
+                                  {"vertices", mesh.positions.size()},
+                                  {"bytes", mesh.bytes()}});
+    }
+    json["cameras"] = Json::array();
+    for (const Camera& camera : scene.cameras) json["cameras"].push_back(camera.name);
+    json["materials"] = Json::array();
+    for (const Material& material : scene.materials) json["materials"].push_back(material.name);
+    json["textures"] = scene.textures.size();
+    json["warnings"] = warnings;
+    return json;
+}
+
+// 1,234,567; three digits and a power of ten from 10^15 on.
+std::string groupedDigits(double count) {
+    char text[64];
+    if (count >= 1e15) {
+        std::snprintf(text, sizeof text, "%.3g", count);
+        return text;
+    }
+    std::snprintf(text, sizeof text, "%.0f", count);
+    std::string result = text;
+    for (int i = int(result.size()) - 3; i > 0; i -= 3) result.insert(size_t(i), ",");
+    return result;
+}
+
+std::string byteSize(double bytes) {
+    char text[64];
+    std::snprintf(text, sizeof text, bytes < 1e6 ? "%.1f kB" : "%.1f MB", bytes / (bytes < 1e6 ? 1e3 : 1e6));
+    return text;
+}
+
+std::string joinNames(const Json& names) {
+    constexpr size_t kMostNames = 20;
+    std::string text = std::to_string(names.size());
+    for (size_t i = 0; i < names.size() && i < kMostNames; ++i) {
+        text += (i == 0 ? ": " : ", ") + names[i].get<std::string>();
+    }
+    return text + (names.size() > kMostNames ? ", ..." : "");
+}
+
+void printInfo(const Json& info) {
+    std::ostream& out = std::cout;
+    out << "scene       " << info["path"].get<std::string>() << "\n"
+        << "instances   " << groupedDigits(info["instances"]) << " (" << groupedDigits(info["instances_stored"])
+        << " stored)\n"
+        << "triangles   " << groupedDigits(info["triangles_unique"]) << " unique, "
+        << groupedDigits(info["triangles_total"]) << " expanded\n"
+        << "memory      " << byteSize(info["bytes"]) << ", of that " << byteSize(info["instance_bytes"])
+        << " for instances\n"
+        << "cameras     " << joinNames(info["cameras"]) << "\n"
+        << "materials   " << joinNames(info["materials"]) << "\n"
+        << "textures    " << info["textures"] << "\n";
+    out << "groups\n";
+    for (const Json& group : info["groups"]) {
+        out << "  " << group["name"].get<std::string>() << ": depth " << group["depth"] << ", "
+            << groupedDigits(group["instances"]) << " instances (" << groupedDigits(group["instances_stored"])
+            << " stored), " << groupedDigits(group["triangles"]) << " triangles"
+            << (group["root"] ? ", root" : "") << "\n";
+    }
+    out << "assets\n";
+    for (const Json& asset : info["assets"]) {
+        out << "  " << asset["name"].get<std::string>() << ": " << groupedDigits(asset["triangles"])
+            << " triangles, " << byteSize(asset["bytes"]) << "\n";
+    }
+}
+
+}  // namespace
+
+ExitCode runInfo(const std::vector<std::string>& arguments) {
+    CLI::App app;
+    std::string path;
+    LoadOptions load_options;
+    bool as_json = false;
+    app.add_option("SCENE", path, "*.scene.json, .gltf or .glb")->required()->group("Arguments");
+    app.add_flag("--json", as_json, "print JSON");
+    app.add_flag("--allow-outside", load_options.allow_outside, "let the scene's paths leave its folder");
+    app.add_option("--memory-limit", load_options.memory_limit_mb,
+                   "most memory that loading may take, in MB (default: the machine's)")
+        ->type_name("MB");
+    if (!parseArguments(app, kHelp, arguments)) return ExitCode::kDone;
+
+    const CancelFlag& cancel = cancelOnSignals();
+    load_options.cancel = &cancel;
+    Diagnostics diagnostics;
+    ThreadPool pool;
+    const Scene scene = loadScene(path, load_options, pool, diagnostics);
+    throwIfCancelled(cancel);
+    for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
+    const Json info = infoJson(scene, diagnostics.warnings);
+    if (as_json) {
+        std::cout << info.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    } else {
+        printInfo(info);
+    }
+    return ExitCode::kDone;
+}
+
+}  // namespace stipple

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// `stipple render`: check the command line, load, draw, write.
+#include <core/nearest_name.h>
+#include <render/renderer.h>
+#include <scenegraph/io/load.h>
+#include <tools/command_line.h>
+#include <tools/commands.h>
+#include <tools/output_file.h>
+#include <tools/progress.h>
+#include <tools/signals.h>
+#include <tools/stats_json.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+#include <sstream>
+
+namespace stipple {
+
+namespace {
+
+struct RenderOptions {
+    std::string scene;
+    std::string output;
+    std::string camera;
+    std::vector<std::string> aovs;
+    bool transparent = false;
+    int repeat = 1;
+    uint64_t memory_limit_mb = 0;
+    std::string debug_pixel;
+    bool allow_outside = false;
+    std::string stats;
+    bool quiet = false;
+    SettingOptions settings;
+};
+
+const std::vector<std::string> kAovNames = {"depth", "normal", "albedo", "object", "coverage", "count"};
+
+const HelpText kHelp = {
+    "stipple render SCENE -o OUT.png|OUT.exr [options]",
+    "Draws a picture of a scene and prints its path. SCENE is a scene file (*.scene.json) or a single model (.gltf, "
+    ".glb), for which a camera and a light are made.",
+    {"stipple render scenes/forest.scene.json -o forest.png --width 1920 --height 1080",
+     "stipple render tree.glb -o tree.exr --aov depth,normal --samples 4 --stats tree.json"}};
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void addOptions(CLI::App& app, RenderOptions& options) {
+    app.add_option("SCENE", options.scene, "*.scene.json, .gltf or .glb")->required()->group("Arguments");
+    app.add_option("-o,--output", options.output,
+                   "the picture: .png (sRGB, 8 bits) or .exr (linear floats); appears whole or not at all")
+        ->required()
+        ->type_name("FILE")
+        ->group("Picture");
+    app.add_option("--camera", options.camera, "a camera of the scene (default: the first)")
+        ->type_name("NAME")
+        ->group("Picture");
+    app.add_option("--aov", options.aovs,
+                   "further channels of an .exr, separated by commas: depth, normal, albedo, object, coverage, count")
+        ->type_name("NAMES")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->group("Picture");
+    app.add_flag("--transparent", options.transparent, "leave the background out; alpha is coverage")->group("Picture");
+    options.settings.addTo(app);
+    app.add_option("--repeat", options.repeat,
+                   "draw the frame this often; --stats lists the times, the first one cold (default 1)")
+        ->type_name("N")
+        ->check(CLI::Range(1, 100000).description(""))
+        ->group("Running");
+    app.add_option("--memory-limit", options.memory_limit_mb,
+                   "most memory that loading may take, in MB (default: the machine's)")
+        ->type_name("MB")
+        ->group("Running");
+    app.add_option("--debug-pixel", options.debug_pixel, "print to stderr what happens at this pixel")
+        ->type_name("X,Y")
+        ->group("Running");
+    app.add_flag("--allow-outside", options.allow_outside, "let the scene's paths leave its folder")->group("Running");
+    app.add_option("--stats", options.stats, "write times, counters and memory as JSON")
+        ->type_name("FILE.json")
+        ->group("Running");
+    app.add_flag("-q,--quiet", options.quiet, "no progress, only warnings and errors")->group("Running");
+}
+
+// Throws unless `text` is "X,Y" within the picture.
+void checkDebugPixel(const std::string& text, const RenderSettings& settings) {
+    int x = 0, y = 0, length = 0;
+    if (std::sscanf(text.c_str(), "%d,%d%n", &x, &y, &length) != 2 || size_t(length) != text.size()) {
+        throw Error(ErrorCode::kInvalidArgument, "--debug-pixel", "'" + text + "' is not X,Y");
+    }
+    if (x < 0 || y < 0 || x >= settings.width || y >= settings.height) {
+        throw Error(ErrorCode::kInvalidArgument, "--debug-pixel",
+                    text + " is outside the picture of " + std::to_string(settings.width) + " x " +
+                        std::to_string(settings.height));
+    }
+}
+
+// What can be said about the command line before the scene is loaded.
+void checkOptions(const RenderOptions& options) {
+    checkOutputFile("-o", options.output, {".png", ".exr"});
+    if (!options.stats.empty()) checkOutputFile("--stats", options.stats, {});
+    for (const std::string& aov : options.aovs) {
+        if (std::find(kAovNames.begin(), kAovNames.end(), aov) != kAovNames.end()) continue;
+        const std::string nearest = nearestName(aov, kAovNames);
+        throw Error(ErrorCode::kInvalidArgument, "--aov",
+                    "unknown channel '" + aov + "'" +
+                        (nearest.empty() ? "; --help lists them" : "; did you mean '" + nearest + "'?"));
+    }
+    if (!options.aovs.empty() && lowerExtension(options.output) != ".exr") {
+        throw Error(ErrorCode::kInvalidArgument, "--aov", "needs an .exr output; .png holds colour only");
+    }
+    RenderSettings settings;
+    options.settings.apply(settings);
+    makeView(Camera(), settings.width, settings.height, settings.subpixels);  // throws for absurd sizes
+}
+
+// Defaults, then the scene file's (which the loader has checked), then the command line's.
+RenderSettings effectiveSettings(const RenderOptions& options, const Scene& scene) {
+    RenderSettings settings;
+    for (const auto& [key, value] : scene.render_defaults) applySetting(settings, key, value, scene.path);
+    options.settings.apply(settings);
+    return settings;
+}
+
+const Camera& chooseCamera(const Scene& scene, const std::string& name) {
+    if (scene.cameras.empty()) throw Error(ErrorCode::kInvalidScene, scene.path, "has no camera");
+    if (name.empty()) return scene.cameras.front();
+    if (const Camera* camera = scene.findCamera(name)) return *camera;
+    std::string known;
+    for (const Camera& camera : scene.cameras) known += (known.empty() ? "" : ", ") + camera.name;
+    throw Error(ErrorCode::kInvalidArgument, "--camera", "there is no '" + name + "'; " + scene.path + " has: " + known);
+}
+
+std::string joinCommand(const std::vector<std::string>& arguments) {
+    std::string command = "stipple render";
+    for (const std::string& argument : arguments) command += " " + argument;
+    return command;
+}
+
+// What an .exr says about how it was made.
+std::map<std::string, std::string> imageMetadata(const RunStats& stats) {
+    std::map<std::string, std::string> metadata = {{"stipple:version", STIPPLE_VERSION},
+                                                   {"stipple:command", stats.command},
+                                                   {"stipple:camera", stats.camera}};
+    for (const SettingInfo& info : settingsTable()) {
+        metadata["stipple:" + info.key] = settingValue(stats.settings, info.key);
+    }
+    return metadata;
+}
+
+}  // namespace
+
+ExitCode runRender(const std::vector<std::string>& arguments) {
+    CLI::App app;
+    RenderOptions options;
+    addOptions(app, options);
+    if (!parseArguments(app, kHelp, arguments)) return ExitCode::kDone;
+    checkOptions(options);
+
+    const CancelFlag& cancel = cancelOnSignals();
+    Progress progress(options.quiet);
+    RunStats stats;
+    stats.command = joinCommand(arguments);
+    stats.scene_path = options.scene;
+
+    progress.update("load", 0.0);
+    auto start = std::chrono::steady_clock::now();
+    Diagnostics diagnostics;
+    RenderSettings command_line_settings;
+    options.settings.apply(command_line_settings);
+    ThreadPool load_pool(command_line_settings.threads);
+    const LoadOptions load_options = {options.allow_outside, options.memory_limit_mb, &cancel};
+    const Scene scene = loadScene(options.scene, load_options, load_pool, diagnostics);
+    throwIfCancelled(cancel);
+    stats.load_seconds = secondsSince(start);
+    progress.finish();
+    for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
+
+    FrameRequest request;
+    request.settings = effectiveSettings(options, scene);
+    request.camera = chooseCamera(scene, options.camera);
+    request.transparent = options.transparent;
+    request.aovs = options.aovs;
+    request.debug_pixel = options.debug_pixel;
+    request.cancel = &cancel;
+    request.progress = [&](const char* phase, double fraction) { progress.update(phase, fraction); };
+    if (!options.debug_pixel.empty()) checkDebugPixel(options.debug_pixel, request.settings);
+    stats.settings = request.settings;
+    stats.camera = request.camera.name;
+    stats.scene = sceneSize(scene);
+    stats.warnings = diagnostics.warnings;
+
+    start = std::chrono::steady_clock::now();
+    ThreadPool pool(request.settings.threads);
+    Renderer renderer(scene, pool);
+    stats.build_seconds = secondsSince(start);
+    Frame frame;
+    for (int i = 0; i < options.repeat; ++i) {
+        frame = renderer.render(request);
+        stats.frames.push_back(frame.stats);
+        throwIfCancelled(cancel);
+    }
+
+    progress.update("write", 0.0);
+    start = std::chrono::steady_clock::now();
+    saveImage(frame.image, options.output, imageMetadata(stats));
+    stats.write_seconds = secondsSince(start);
+    if (!options.stats.empty()) saveFile(options.stats, statsJson(stats));
+    progress.finish();
+    std::cout << options.output << "\n";
+    return ExitCode::kDone;
+}
+
+}  // namespace stipple

@@ -1,0 +1,359 @@
+#!/usr/bin/env bash
+# Runs one case against the program: exit codes, one-line errors, what is on stdout, which files are left.
+# usage: cli_test.sh STIPPLE REPOSITORY CASE
+set -u
+stipple=$1
+repository=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+
+fail() {
+    echo "FAILED: $*"
+    echo "--- stdout" && head -c 2000 stdout.txt
+    echo "--- stderr" && head -c 2000 stderr.txt
+    exit 1
+} 2>/dev/null
+
+# run ARGUMENTS...: sets $code, stdout.txt and stderr.txt.
+run() {
+    "$stipple" "$@" >stdout.txt 2>stderr.txt
+    code=$?
+}
+
+# expect_ok ARGUMENTS...
+expect_ok() {
+    run "$@"
+    [[ $code == 0 ]] || fail "exit code $code: $*"
+}
+
+# expect_error CODE REGEX ARGUMENTS...: nothing on stdout, one line on stderr that starts with "stipple: ".
+expect_error() {
+    local expected=$1 regex=$2
+    shift 2
+    run "$@"
+    [[ $code == "$expected" ]] || fail "exit code $code, not $expected: $*"
+    [[ ! -s stdout.txt ]] || fail "something on stdout"
+    [[ $(grep -c '^stipple: ' stderr.txt) == 1 && $(tail -n 1 stderr.txt) == stipple:\ * ]] ||
+        fail "not one line of error"
+    tail -n 1 stderr.txt | grep -qE -- "$regex" || fail "the error does not match '$regex'"
+}
+
+expect_stdout() { grep -qE -- "$1" stdout.txt || fail "stdout lacks '$1'"; }
+expect_no_file() { [[ -z $(find . -name "$1") ]] || fail "there is a file $1"; }
+
+# A scene of one sphere; $1: further keys, each with a comma at its end.
+write_scene() {
+    cat >scene.scene.json <<JSON
+{
+  "version": 1, ${1:-}
+  "assets": { "ball": { "generate": "sphere", "triangles": 500 } },
+  "cameras": [ { "name": "front", "eye": [0, 0, 3], "target": [0, 0, 0] },
+               { "name": "top", "eye": [0, 3, 0.1], "target": [0, 0, 0] } ],
+  "root": "ball"
+}
+JSON
+}
+tiny=(--width 32 --height 24)
+
+case_no_arguments() {
+    run
+    [[ $code == 2 ]] || fail "exit code $code"
+    [[ ! -s stdout.txt ]] || fail "something on stdout"
+    grep -q '^Usage: stipple' stderr.txt || fail "no usage"
+}
+
+case_help() {
+    for arguments in --help help "help render" "render --help" "info -h" "compare --help" "generate --help" "help settings"; do
+        # shellcheck disable=SC2086
+        expect_ok $arguments
+        [[ -s stdout.txt && ! -s stderr.txt ]] || fail "help belongs on stdout: $arguments"
+    done
+    expect_ok render --help
+    expect_stdout '1280'
+    expect_stdout 'Examples:'
+    expect_ok help settings
+    expect_stdout 'cut_ratio.* '
+}
+
+# docs/cli.md names every option of every command, and no option that does not exist.
+case_help_names_every_option() {
+    for command in render info compare generate; do "$stipple" help "$command"; done |
+        grep -oE -- '^  (-. )?--[a-z-]+' | grep -oE -- '--[a-z-]+' | sort -u >have.txt
+    grep -oE -- '--[a-z][a-z-]*' "$repository/docs/cli.md" | sort -u >documented.txt
+    [[ $(wc -l <have.txt) -gt 20 ]] || fail "cannot read the help"
+    diff have.txt documented.txt || fail "docs/cli.md and --help differ"
+    "$stipple" help settings | grep -oE '^  [a-z_]+' | tr -d ' ' >settings.txt
+    while read -r key; do
+        grep -qE -- "$key|--${key//_/-}" "$repository/docs/cli.md" || fail "docs/cli.md lacks $key"
+    done <settings.txt
+}
+
+case_version() {
+    expect_ok --version
+    expect_stdout '^stipple [0-9]+\.[0-9]+\.[0-9]+$'
+}
+
+case_unknown_command() { expect_error 2 "did you mean 'render'" rendr; }
+case_unknown_option() { expect_error 2 "unknown option '--wdith'; did you mean '--width'" render --wdith 5; }
+case_option_without_value() { expect_error 2 '--width' render a.glb -o a.png --width; }
+
+case_bad_setting() {
+    expect_error 2 "did you mean 'samples'" render a.glb -o a.png --set sampels=1
+    expect_error 2 'KEY=VALUE' render a.glb -o a.png --set samples
+    expect_error 2 'points\|zbuffer\|raycast' render a.glb -o a.png --method magic
+    expect_error 2 '--samples' render a.glb -o a.png --samples nan
+    expect_error 2 '--threads' render a.glb -o a.png --threads -1
+    expect_error 2 '--seed' render a.glb -o a.png --seed 1.5
+}
+
+case_aov_with_png() {
+    write_scene
+    expect_error 2 '--aov' render scene.scene.json -o a.png --aov depth
+    expect_error 2 "did you mean 'normal'" render scene.scene.json -o a.exr --aov depth,norml
+}
+
+case_absurd_width() {
+    write_scene
+    expect_error 2 '65536' render scene.scene.json -o a.png --width 99999999999
+    expect_error 2 'range' render scene.scene.json -o a.png --width 65536 --height 65536
+    expect_no_file 'a.png'
+}
+
+case_output_extension() { expect_error 2 '\.png or \.exr' render a.glb -o a.jpg; }
+
+case_unwritable_output() {
+    write_scene
+    expect_error 1 'no folder' render scene.scene.json -o missing/a.png
+    expect_error 1 'no folder' render scene.scene.json -o a.png --stats missing/a.json
+    mkdir folder.png
+    expect_error 1 'not a regular file' render scene.scene.json -o folder.png
+}
+
+case_full_disk() {
+    write_scene
+    "$stipple" info scene.scene.json >/dev/full 2>stderr.txt
+    code=$?
+    : >stdout.txt
+    [[ $code == 1 ]] || fail "exit code $code"
+    grep -qx 'stipple: cannot write to standard output' stderr.txt || fail "wrong error"
+    expect_error 1 'not a regular file' render scene.scene.json -o a.png --stats /dev/full
+    expect_no_file 'a.png'
+}
+
+case_missing_file() {
+    expect_error 3 'missing\.glb' render missing.glb -o a.png
+    expect_error 3 'missing\.scene\.json' info missing.scene.json
+    expect_error 3 'a\.png' compare a.png b.png
+    expect_no_file 'a.png'
+}
+
+case_garbage_glb() {
+    head -c 4096 /dev/urandom >garbage.glb
+    expect_error 3 '^stipple: garbage\.glb: ' render garbage.glb -o a.png
+    : >empty.glb
+    expect_error 3 '^stipple: empty\.glb: ' info empty.glb
+    "$stipple" generate rock -o rock.glb >/dev/null || fail "cannot generate"
+    head -c 1000 rock.glb >cut.glb
+    expect_error 3 '^stipple: cut\.glb: ' info cut.glb
+}
+
+case_json_syntax_error() {
+    printf '{\n  "version": 1,\n  "root" "ball"\n}\n' >a.scene.json
+    expect_error 3 'a\.scene\.json: line 3, column' info a.scene.json
+}
+
+case_schema_violation() {
+    write_scene '"exposure": "bright",'
+    expect_error 3 'scene\.scene\.json: /exposure: ' info scene.scene.json
+    write_scene '"colour": 1,'
+    expect_error 3 'colour' info scene.scene.json
+}
+
+case_unknown_asset() {
+    write_scene '"groups": { "all": { "instances": [ { "child": "bell" } ] } },'
+    sed -i 's/"root": "ball"/"root": "all"/' scene.scene.json
+    expect_error 3 '/groups/all/instances/0/child: .*bell' info scene.scene.json
+}
+
+case_group_in_itself() {
+    write_scene '"groups": { "a": { "instances": [ { "child": "b" } ] }, "b": { "instances": [ { "child": "a" } ] } },'
+    sed -i 's/"root": "ball"/"root": "a"/' scene.scene.json
+    expect_error 3 'scene\.scene\.json: .*itself' info scene.scene.json
+}
+
+case_too_many_instances() {
+    write_scene '"groups": { "all": { "scatter": { "items": [ { "child": "ball" } ], "count": 1000000000000, "size": 1000 } } },'
+    sed -i 's/"root": "ball"/"root": "all"/' scene.scene.json
+    ulimit -v 16000000
+    run info scene.scene.json
+    [[ $code == 1 || $code == 3 ]] || fail "exit code $code"
+    grep -qE '^stipple: scene\.scene\.json: /groups/all/scatter' stderr.txt || fail "wrong place"
+}
+
+case_path_leaves_folder() {
+    mkdir inside
+    "$stipple" generate rock -o rock.glb >/dev/null || fail "cannot generate"
+    echo '{ "version": 1, "assets": { "rock": { "file": "../rock.glb" } }, "root": "rock" }' >inside/a.scene.json
+    expect_error 3 '/assets/rock/file: .*outside' info inside/a.scene.json
+    expect_ok info inside/a.scene.json --allow-outside
+    ln -s ../rock.glb inside/link.glb
+    sed -i 's|\.\./rock|link|' inside/a.scene.json
+    expect_error 3 'outside' info inside/a.scene.json
+}
+
+case_bad_render_default() {
+    write_scene '"render": { "sampels": 2 },'
+    expect_error 3 "/render/sampels: .*did you mean 'samples'" info scene.scene.json
+    write_scene '"render": { "width": 0 },'
+    expect_error 3 '/render/width' info scene.scene.json
+}
+
+case_unknown_camera() {
+    write_scene
+    expect_error 2 "'side'.*front, top" render scene.scene.json -o a.png --camera side
+}
+
+case_debug_pixel_outside() {
+    write_scene
+    expect_error 2 '--debug-pixel' render scene.scene.json -o a.png "${tiny[@]}" --debug-pixel 32,0
+    expect_error 2 '--debug-pixel' render scene.scene.json -o a.png "${tiny[@]}" --debug-pixel 3
+    expect_ok render scene.scene.json -o a.png "${tiny[@]}" --debug-pixel 16,12
+    grep -q '16' stderr.txt || fail "nothing about the pixel"
+}
+
+case_memory_limit() {
+    "$stipple" generate terrain --count 2000000 -o terrain.glb >/dev/null || fail "cannot generate"
+    expect_error 1 'terrain\.glb' info terrain.glb --memory-limit 20
+}
+
+case_render_png() {
+    write_scene
+    for method in points zbuffer raycast; do
+        expect_ok render scene.scene.json -o "$method.png" "${tiny[@]}" --method $method
+        [[ $(cat stdout.txt) == "$method.png" ]] || fail "stdout is not the picture's path"
+        [[ $(head -c 4 $method.png | tail -c 3) == PNG ]] || fail "no PNG"
+        grep -qE '^write: [0-9.]+ s$' stderr.txt || fail "no line a phase"
+    done
+    expect_ok render scene.scene.json -o quiet.png "${tiny[@]}" --quiet --transparent --camera top
+    [[ ! -s stderr.txt ]] || fail "not quiet"
+}
+
+case_render_exr_with_channels() {
+    write_scene
+    expect_ok render scene.scene.json -o a.exr "${tiny[@]}" --aov depth,normal,albedo,object,coverage,count
+    for text in depth normal stipple:seed stipple:command; do
+        grep -aq "$text" a.exr || fail "the header lacks $text"
+    done
+}
+
+case_settings_precedence() {
+    write_scene '"render": { "width": 20, "height": 10, "samples": 3, "shadows": false },'
+    expect_ok render scene.scene.json -o a.png --height 12 --set height=14 --set subpixels=2 --stats a.json
+    grep -q '"width": 20,' a.json || fail "not the scene file's width"
+    grep -q '"height": 12,' a.json || fail "the option must win"
+    grep -q '"samples": 3,' a.json || fail "not the scene file's samples"
+    grep -q '"subpixels": 2,' a.json || fail "--set was ignored"
+    grep -q '"seed": 1,' a.json || fail "not the default seed"
+}
+
+case_stats_file() {
+    write_scene
+    for method in points zbuffer raycast; do
+        expect_ok render scene.scene.json -o a.png "${tiny[@]}" --method $method --repeat 3 --stats a.json
+        for key in schema version command scene settings phases counters memory frames warnings \
+            load build plan draw raster reconstruct shade write instances triangles_unique triangles_total bytes \
+            points_drawn points_kept points_culled batches large_triangles overestimation peak_bytes cache_bytes; do
+            grep -q "\"$key\"" a.json || fail "--stats lacks $key with $method"
+        done
+        [[ $(tr -d ' \n' <a.json | grep -oE '"frames":\[[^]]*' | tr ',' '\n' | wc -l) == 3 ]] || fail "not 3 frames"
+    done
+}
+
+case_same_bits_for_any_threads() {
+    write_scene
+    for threads in 1 2 5; do
+        expect_ok render scene.scene.json -o $threads.png --width 200 --height 150 --threads $threads --cache-mb off
+    done
+    cmp 1.png 2.png && cmp 1.png 5.png || fail "pictures differ"
+    expect_ok render scene.scene.json -o cached.png --width 200 --height 150 --repeat 2
+    cmp 1.png cached.png || fail "the cached picture differs"
+}
+
+# interrupt SIGNAL SECONDS ARGUMENTS...: expects exit code 6 and no picture.
+interrupt() {
+    local signal=$1 seconds=$2
+    shift 2
+    "$stipple" "$@" >stdout.txt 2>stderr.txt &
+    local pid=$!
+    sleep "$seconds"
+    kill "-$signal" $pid || fail "it ended before it was interrupted"
+    wait $pid
+    code=$?
+    [[ $code == 6 ]] || fail "exit code $code"
+    [[ ! -s stdout.txt ]] || fail "something on stdout"
+    [[ $(tail -n 1 stderr.txt) == 'stipple: '* ]] || fail "no message"
+    expect_no_file 'a.png*'
+    expect_no_file '*tmp*'
+}
+
+case_interrupt_render() {
+    write_scene
+    interrupt INT 2 render scene.scene.json -o a.png --method raycast --samples 10000
+    interrupt TERM 2 render scene.scene.json -o a.png --repeat 100000
+}
+
+case_interrupt_load() {
+    "$stipple" generate forest --count 5000000 -o big.scene.json >/dev/null || fail "cannot generate"
+    sed -i 's/"triangles": 20000/"triangles": 300000/' big.scene.json
+    interrupt INT 0.3 render big.scene.json -o a.png
+}
+
+case_info() {
+    write_scene
+    expect_ok info scene.scene.json
+    expect_stdout '^cameras +2: front, top$'
+    expect_stdout '^instances +1 '
+    expect_ok info scene.scene.json --json
+    expect_stdout '"triangles_total"'
+    [[ ! -s stderr.txt ]] || fail "something on stderr"
+}
+
+case_compare() {
+    write_scene
+    expect_ok render scene.scene.json -o a.png "${tiny[@]}" --seed 1
+    expect_ok render scene.scene.json -o b.png "${tiny[@]}" --camera top
+    expect_ok render scene.scene.json -o small.png --width 16 --height 16
+    expect_ok compare a.png a.png --json --fail-below 100
+    expect_stdout '"identical": true'
+    expect_ok compare a.png b.png -o difference.png
+    expect_stdout '^PSNR +[0-9.]+ dB$'
+    [[ -s difference.png ]] || fail "no picture of the differences"
+    run compare a.png b.png --fail-below 90
+    [[ $code == 4 ]] || fail "exit code $code, not 4"
+    expect_error 5 '32 x 24.*16 x 16' compare a.png small.png
+}
+
+case_generate() {
+    for kind in tree grass rock terrain; do
+        expect_ok generate $kind -o $kind.glb
+        [[ $(cat stdout.txt) == $kind.glb ]] || fail "stdout is not the path"
+        expect_ok info $kind.glb
+    done
+    expect_ok generate tree --seed 7 -o again.glb
+    expect_ok generate tree --seed 7 -o same.glb
+    cmp again.glb same.glb || fail "the same seed gives another tree"
+    cmp -s again.glb tree.glb && fail "another seed gives the same tree"
+    expect_ok generate forest --count 500 -o forest.scene.json
+    expect_ok render forest.scene.json -o forest.png "${tiny[@]}"
+    expect_ok generate landscape --count 100000000 -o landscape.scene.json
+    expect_ok info landscape.scene.json --json
+    expect_ok render landscape.scene.json -o landscape.png "${tiny[@]}"
+    expect_error 2 "did you mean 'tree'" generate tre -o a.glb
+    expect_error 2 '\.glb' generate tree -o a.obj
+    expect_error 2 '\.scene\.json' generate forest -o a.json
+    expect_error 2 '1000\.\.2000000' generate tree --count 3 -o a.glb
+}
+
+"case_$3"
+echo "passed"

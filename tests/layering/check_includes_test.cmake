@@ -1,0 +1,28 @@
+# Writes one file for each kind of forbidden include and expects check_includes.cmake to refuse each, and to accept a good one.
+cmake_minimum_required(VERSION 3.21)
+
+function(expect outcome path include)
+  file(REMOVE_RECURSE ${WORK_DIR})
+  file(WRITE ${WORK_DIR}/${path} "#include <${include}>\n")
+  execute_process(COMMAND ${CMAKE_COMMAND} -DSOURCE_DIR=${WORK_DIR} -P ${CHECK}
+                  RESULT_VARIABLE result OUTPUT_QUIET ERROR_QUIET)
+  if(result EQUAL 0)
+    set(result accepted)
+  else()
+    set(result refused)
+  endif()
+  if(NOT result STREQUAL outcome)
+    message(SEND_ERROR "${path} with <${include}> was ${result}")
+  endif()
+endfunction()
+
+expect(accepted sampling/a.cpp scenegraph/scene.h)
+expect(accepted src/raycast/a.cpp embree3/rtcore.h)
+expect(refused src/core/a.h scenegraph/scene.h)
+expect(refused reconstruct/a.cpp scenegraph/scene.h)
+expect(refused scenegraph/io/a.cpp render/renderer.h)
+expect(refused src/tools/a.cpp sampling/plan.h)
+expect(refused src/render/a.cpp embree3/rtcore.h)
+expect(refused src/tools/a.cpp GL/osmesa.h)
+expect(refused src/render/a.cpp OpenImageIO/imageio.h)
+expect(refused src/core/image.cpp tbb/parallel_for.h)

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// Noise, height fields and the terrain made of them.
+#include <core/error.h>
+#include <gtest/gtest.h>
+#include <scenegraph/procedural/generators.h>
+#include <scenegraph/procedural/noise.h>
+
+namespace stipple {
+namespace {
+
+TEST(ProceduralNoise, derivativeMatchesDifferences) {
+    const double step = 1e-5;
+    for (int i = 0; i < 200; ++i) {
+        const DVec2 p(i * 0.37 - 30.0, i * 0.91 - 77.0);
+        const NoiseSample s = gradientNoise(9, p);
+        const double dx =
+            gradientNoise(9, p + DVec2(step, 0)).value - gradientNoise(9, p - DVec2(step, 0)).value;
+        const double dy =
+            gradientNoise(9, p + DVec2(0, step)).value - gradientNoise(9, p - DVec2(0, step)).value;
+        EXPECT_NEAR(s.derivative.x, dx / (2 * step), 1e-5);
+        EXPECT_NEAR(s.derivative.y, dy / (2 * step), 1e-5);
+    }
+}
+
+TEST(ProceduralNoise, isBoundedWithMeanZero) {
+    double sum2 = 0, sum3 = 0, low = 0, high = 0;
+    const int n = 40000;
+    for (int i = 0; i < n; ++i) {
+        const double a = gradientNoise(4, DVec2(i * 0.713, i * -0.129)).value;
+        const double b = gradientNoise(4, DVec3(i * 0.713, i * -0.129, i * 0.31));
+        sum2 += a, sum3 += b;
+        low = std::min({low, a, b}), high = std::max({high, a, b});
+    }
+    EXPECT_NEAR(sum2 / n, 0.0, 0.02);
+    EXPECT_NEAR(sum3 / n, 0.0, 0.02);
+    EXPECT_GE(low, -1.0);
+    EXPECT_LE(high, 1.0);
+    EXPECT_LT(low, -0.5);
+    EXPECT_GT(high, 0.5);
+}
+
+TEST(ProceduralTerrain, heightsSpanTheRelief) {
+    for (const char* style : {"meadow", "forest_floor", "mountain"}) {
+        const TerrainParams params{
+            .seed = 2, .size = 800.0, .resolution = 65, .relief = 42.0, .style = style};
+        const HeightField field = makeHeightField(params);
+        ASSERT_EQ(field.heights.size(), 65u * 65u);
+        const auto [low, high] = std::minmax_element(field.heights.begin(), field.heights.end());
+        EXPECT_FLOAT_EQ(*low, 0.0f);
+        EXPECT_NEAR(*high, 42.0f, 1e-3f);
+        EXPECT_EQ(field.heights, makeHeightField(params).heights);
+    }
+}
+
+TEST(ProceduralTerrain, fieldInterpolatesAndClamps) {
+    // A slope: y = 3 (x + 5) on 3 x 3 samples over 10 m, so the normal is (-3, 1, 0) / sqrt(10).
+    HeightField field;
+    field.resolution = 3;
+    field.size = 10.0;
+    field.heights = {0, 15, 30, 0, 15, 30, 0, 15, 30};
+    EXPECT_NEAR(field.height(0.0, 0.0), 15.0, 1e-9);
+    EXPECT_NEAR(field.height(2.5, -4.0), 22.5, 1e-9);
+    EXPECT_NEAR(field.height(100.0, 100.0), 30.0, 1e-9);
+    EXPECT_NEAR(field.height(-100.0, 0.0), 0.0, 1e-9);
+    for (const double x : {-50.0, -5.0, -4.9, 0.0, 1.0, 5.0, 50.0}) {
+        const Vec3 n = field.normal(x, x);
+        EXPECT_NEAR(n.x, -3.0 / std::sqrt(10.0), 1e-6) << x;
+        EXPECT_NEAR(n.y, 1.0 / std::sqrt(10.0), 1e-6) << x;
+        EXPECT_NEAR(n.z, 0.0, 1e-6) << x;
+    }
+}
+
+TEST(ProceduralTerrain, meshLiesOnTheFieldAndFacesUp) {
+    const TerrainParams params{
+        .size = 200.0, .resolution = 33, .relief = 20.0, .style = "mountain"};
+    const HeightField field = makeHeightField(params);
+    const GeneratedMesh terrain = makeTerrain(params, field);
+    const Mesh& mesh = terrain.mesh;
+    ASSERT_EQ(mesh.triangles.size(), 2u * 32u * 32u);
+    ASSERT_EQ(mesh.positions.size(), 33u * 33u);
+    for (size_t i = 0; i < mesh.positions.size(); ++i) {
+        const Vec3 p = mesh.positions[i];
+        EXPECT_NEAR(p.y, field.height(p.x, p.z), 1e-3);
+        EXPECT_NEAR(glm::length(mesh.normals[i]), 1.0f, 1e-5f);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_TRUE(mesh.colors[i][c] >= 0.0f && mesh.colors[i][c] <= 1.0f);
+    }
+    for (const UVec3& t : mesh.triangles) {
+        const Vec3 a = mesh.positions[t.x], b = mesh.positions[t.y], c = mesh.positions[t.z];
+        ASSERT_GT(glm::cross(b - a, c - a).y, 0.0f);
+    }
+}
+
+TEST(ProceduralTerrain, mountainsHaveSnowAboveAndNotBelow) {
+    const TerrainParams params{.size = 2000.0,
+                               .resolution = 257,
+                               .relief = 500.0,
+                               .feature_size = 900.0,
+                               .style = "mountain"};
+    const GeneratedMesh terrain = makeTerrain(params, makeHeightField(params));
+    size_t white_above = 0, white_below = 0;
+    for (size_t i = 0; i < terrain.mesh.positions.size(); ++i) {
+        if (terrain.mesh.colors[i].x < 0.7f) continue;
+        (terrain.mesh.positions[i].y > 200.0f ? white_above : white_below) += 1;
+    }
+    EXPECT_GT(white_above, 200u);
+    EXPECT_EQ(white_below, 0u);
+}
+
+TEST(ProceduralTerrain, flatReliefStaysFinite) {
+    const TerrainParams params{.resolution = 2, .relief = 0.0};
+    const HeightField field = makeHeightField(params);
+    for (const float h : field.heights) EXPECT_EQ(h, 0.0f);
+    const GeneratedMesh terrain = makeTerrain(params, field);
+    for (const Vec3& n : terrain.mesh.normals) EXPECT_EQ(n, Vec3(0, 1, 0));
+}
+
+TEST(ProceduralTerrain, refusesNonsense) {
+    EXPECT_THROW(makeHeightField({.resolution = 1}), Error);
+    EXPECT_THROW(makeHeightField({.resolution = 1 << 20}), Error);
+    EXPECT_THROW(makeHeightField({.size = -5.0}), Error);
+    EXPECT_THROW(makeHeightField({.relief = std::nan("")}), Error);
+    EXPECT_THROW(makeHeightField({.style = "moon"}), Error);
+}
+
+}  // namespace
+}  // namespace stipple
