@@ -21,7 +21,8 @@ void DepthTile::reset(const SubpixelRect& rect, const RasterTarget* base, uint32
     refreshHidden();
 }
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void DepthTile::refreshHidden() {
+__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void
+DepthTile::refreshHidden() {
     std::fill(farthest_.begin(), farthest_.end(), 0.0f);
     for (int y = 0; y < rect_.height(); ++y) {
         const uint64_t* keys = keys_.data() + size_t(y) * size_t(stride());

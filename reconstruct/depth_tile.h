@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The z-buffer of one tile: nearest depth and number of every subpixel, and what lies hidden behind it.
+// The z-buffer of one tile: nearest depth and number of every subpixel, and what lies hidden behind
+// it.
 #pragma once
 
 #include <core/points.h>
@@ -12,26 +13,37 @@ namespace stipple {
 
 class DepthTile {
 public:
-    // Depth in the high bits and number in the low ones: one comparison, and the same result in any order.
+    // Depth in the high bits and number in the low ones: one comparison, and the same result in any
+    // order.
     static constexpr uint64_t kEmpty = 0x7f800000ffffffffull;  // infinite depth, no number
-    static uint64_t pack(float depth, uint32_t number) { return uint64_t(std::bit_cast<uint32_t>(depth)) << 32 | number; }
+    static uint64_t pack(float depth, uint32_t number) {
+        return uint64_t(std::bit_cast<uint32_t>(depth)) << 32 | number;
+    }
     static float depthOf(uint64_t key) { return std::bit_cast<float>(uint32_t(key >> 32)); }
     static uint32_t numberOf(uint64_t key) { return uint32_t(key); }
 
     // Empty, or with the depths of rasterized triangles (whose numbers get number_bit).
     void reset(const SubpixelRect& rect, const RasterTarget* base, uint32_t number_bit);
     const SubpixelRect& rect() const { return rect_; }
-    // Indexed by the subpixel's x. Rows may be read and written kPadding keys beyond their end (what is written there is lost).
+    // Indexed by the subpixel's x. Rows may be read and written kPadding keys beyond their end
+    // (what is written there is lost).
     static constexpr int kPadding = 8;
-    uint64_t* row(int y) { return keys_.data() + size_t(y - rect_.y0) * size_t(stride()) - rect_.x0; }
-    const uint64_t* row(int y) const { return keys_.data() + size_t(y - rect_.y0) * size_t(stride()) - rect_.x0; }
+    uint64_t* row(int y) {
+        return keys_.data() + size_t(y - rect_.y0) * size_t(stride()) - rect_.x0;
+    }
+    const uint64_t* row(int y) const {
+        return keys_.data() + size_t(y - rect_.y0) * size_t(stride()) - rect_.x0;
+    }
     int stride() const { return rect_.width() + kPadding; }
     std::vector<uint64_t>& keys() { return keys_; }
 
-    // True if every subpixel of `rect` is covered by something nearer than z_min, by what refreshHidden() saw last.
+    // True if every subpixel of `rect` is covered by something nearer than z_min, by what
+    // refreshHidden() saw last.
     bool hides(const SubpixelRect& rect, float z_min) const {
-        const int x0 = std::max(rect.x0, rect_.x0) - rect_.x0, x1 = std::min(rect.x1, rect_.x1) - rect_.x0;
-        const int y0 = std::max(rect.y0, rect_.y0) - rect_.y0, y1 = std::min(rect.y1, rect_.y1) - rect_.y0;
+        const int x0 = std::max(rect.x0, rect_.x0) - rect_.x0,
+                  x1 = std::min(rect.x1, rect_.x1) - rect_.x0;
+        const int y0 = std::max(rect.y0, rect_.y0) - rect_.y0,
+                  y1 = std::min(rect.y1, rect_.y1) - rect_.y0;
         for (int by = y0 / kHiddenBlock; by * kHiddenBlock < y1; ++by) {
             for (int bx = x0 / kHiddenBlock; bx * kHiddenBlock < x1; ++bx) {
                 if (!(farthest_[size_t(by) * size_t(blocks_x_) + size_t(bx)] < z_min)) return false;

@@ -18,14 +18,19 @@ struct Weighted {
 class Gaussian : public TileReconstruction {
 public:
     explicit Gaussian(const ReconstructionContext& context)
-        : context_(context), depth_pass_(context_, 0), sigma_(std::max(0.05f, 0.5f * float(context.settings.splat_size))),
+        : context_(context),
+          depth_pass_(context_, 0),
+          sigma_(std::max(0.05f, 0.5f * float(context.settings.splat_size))),
           radius_(kCut * sigma_),
           // A surface seen at 80 degrees gains 6 subpixels of depth for each subpixel sideways.
-          slack_(std::max(0.01f, context.view.orthographic ? 0.0f : 12.0f / float(context.view.focal))),
+          slack_(std::max(0.01f,
+                          context.view.orthographic ? 0.0f : 12.0f / float(context.view.focal))),
           slack_metres_(context.view.orthographic ? 12.0f / float(context.view.focal) : 0.0f) {}
 
     int passCount() const override { return 2; }
-    int halo() const override { return int(std::ceil(radius_ * float(context_.view.subpixels))) + 2; }
+    int halo() const override {
+        return int(std::ceil(radius_ * float(context_.view.subpixels))) + 2;
+    }
 
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
         inner_ = inner;
@@ -52,7 +57,9 @@ public:
     }
     const SubpixelRect& region() const override { return tile_.rect(); }
 
-    void take(const PointBlock& block) override { pass_ == 0 ? depth_pass_.take(block, tile_) : average(block); }
+    void take(const PointBlock& block) override {
+        pass_ == 0 ? depth_pass_.take(block, tile_) : average(block);
+    }
     void take(const TriangleBlock& block) override {
         if (pass_ == 0) depth_pass_.take(block, tile_);
     }
@@ -74,7 +81,9 @@ private:
         for (int i = 0; i < block.count; ++i) {
             if (!block.keep[i]) continue;
             const Vec2 p = view.project(Vec3(block.x[i], block.y[i], block.z[i]));
-            if (!(p.x >= float(rect.x0) && p.x < float(rect.x1) && p.y >= float(rect.y0) && p.y < float(rect.y1))) continue;
+            if (!(p.x >= float(rect.x0) && p.x < float(rect.x1) && p.y >= float(rect.y0) &&
+                  p.y < float(rect.y1)))
+                continue;
             const uint64_t front = tile_.row(int(p.y))[int(p.x)];
             if (block.z[i] > DepthTile::depthOf(front) * (1.0f + slack_) + slack_metres_) continue;
             SurfaceSample sample;
@@ -106,11 +115,15 @@ private:
     }
 
     void spread(const SurfaceSample& sample, const Vec2& p_sub, float weight) {
-        const Vec3 shaded = shade(sample, (*context_.materials)[sample.material], *context_.lighting, context_.view);
+        const Vec3 shaded = shade(sample, (*context_.materials)[sample.material],
+                                  *context_.lighting, context_.view);
         const float to_pixels = 1.0f / float(context_.view.subpixels);
-        const float x = (p_sub.x - float(inner_.x0)) * to_pixels - 0.5f, y = (p_sub.y - float(inner_.y0)) * to_pixels - 0.5f;
-        const int x0 = std::max(0, int(std::ceil(x - radius_))), x1 = std::min(width_ - 1, int(std::floor(x + radius_)));
-        const int y0 = std::max(0, int(std::ceil(y - radius_))), y1 = std::min(height_ - 1, int(std::floor(y + radius_)));
+        const float x = (p_sub.x - float(inner_.x0)) * to_pixels - 0.5f,
+                    y = (p_sub.y - float(inner_.y0)) * to_pixels - 0.5f;
+        const int x0 = std::max(0, int(std::ceil(x - radius_))),
+                  x1 = std::min(width_ - 1, int(std::floor(x + radius_)));
+        const int y0 = std::max(0, int(std::ceil(y - radius_))),
+                  y1 = std::min(height_ - 1, int(std::floor(y + radius_)));
         const float scale = -0.5f / (sigma_ * sigma_);
         for (int py = y0; py <= y1; ++py) {
             for (int px = x0; px <= x1; ++px) {
@@ -160,7 +173,7 @@ private:
 
     const ReconstructionContext context_;
     DepthPass depth_pass_;
-    const float sigma_, radius_;   // pixels
+    const float sigma_, radius_;  // pixels
     const float slack_, slack_metres_;
     SubpixelRect inner_;
     DepthTile tile_;

@@ -2,7 +2,6 @@
 #include <reconstruct/per_pixel.h>
 
 #include <core/rng.h>
-#include <reconstruct/footprint.h>
 #include <reconstruct/shade.h>
 #include <reconstruct/tile_triangles.h>
 
@@ -11,7 +10,9 @@
 namespace stipple {
 
 DepthPass::DepthPass(const ReconstructionContext& context, int splat_subpixels)
-    : context_(context), splat_subpixels_(splat_subpixels),
+    : context_(context),
+      splat_subpixels_(splat_subpixels),
+      footprints_(float(context.settings.samples)),
       wants_counts_(context.picture->image().channelIndex("count") >= 0) {}
 
 void DepthPass::begin(const SubpixelRect& inner, DepthTile&) {
@@ -27,14 +28,16 @@ void DepthPass::take(const PointBlock& block, DepthTile& tile) {
     const View& view = context_.view;
     const float focal = float(view.focal), cx = float(view.center_x), cy = float(view.center_y);
     const SubpixelRect& rect = tile.rect();
-    const float left = float(rect.x0), right = float(rect.x1), top = float(rect.y0), bottom = float(rect.y1);
+    const float left = float(rect.x0), right = float(rect.x1), top = float(rect.y0),
+                bottom = float(rect.y1);
     float sx[kBlockPoints], sy[kBlockPoints];
     uint8_t inside[kBlockPoints];
     for (int i = 0; i < block.count; ++i) {
         const float scale = view.orthographic ? focal : focal / block.z[i];
         sx[i] = cx + block.x[i] * scale;
         sy[i] = cy + block.y[i] * scale;
-        inside[i] = uint8_t(block.keep[i] & (sx[i] >= left) & (sx[i] < right) & (sy[i] >= top) & (sy[i] < bottom));
+        inside[i] = uint8_t(block.keep[i] & (sx[i] >= left) & (sx[i] < right) & (sy[i] >= top) &
+                            (sy[i] < bottom));
     }
     int kept[kBlockPoints + 1], n_kept = 0;
     for (int i = 0; i < block.count; ++i) {
@@ -42,11 +45,9 @@ void DepthPass::take(const PointBlock& block, DepthTile& tile) {
         n_kept += inside[i];
     }
     // Footprints by stratum: constant within a block.
-    float wide_share[16];
+    Footprint footprints[16];
     if (splat_subpixels_ == 0) {
-        for (int s = 0; s < 16; ++s) {
-            wide_share[s] = wideFootprintShare(block.patch[s], float(context_.settings.samples));
-        }
+        for (int s = 0; s < block.patch_count; ++s) footprints[s] = footprints_.of(block.patch[s]);
     }
     counters_.points_drawn += uint64_t(block.count);
     for (int k = 0; k < n_kept; ++k) {
@@ -57,20 +58,25 @@ void DepthPass::take(const PointBlock& block, DepthTile& tile) {
         counters_.points_kept += is_mine;
         if (wants_counts_ && is_mine) {
             const int s = view.subpixels;
-            ++counts_[size_t((iy - inner_.y0) / s) * size_t(inner_.width() / s) + size_t((ix - inner_.x0) / s)];
+            ++counts_[size_t((iy - inner_.y0) / s) * size_t(inner_.width() / s) +
+                      size_t((ix - inner_.x0) / s)];
         }
         if (splat_subpixels_ > 0) {
             splat(tile, sx[i], sy[i], block.z[i], number, splat_subpixels_);
             continue;
         }
         // The same choice in every tile that sees the point: from its coordinates, not its number.
-        const float share = wide_share[block.stratum[i]];
-        const bool is_wide = share >= 1.0f ||
-                             (share > 0.0f && uniformFloat(mixBits(std::bit_cast<uint32_t>(block.x[i]) * 0x9e3779b9ull ^
-                                                                   std::bit_cast<uint32_t>(block.y[i]))) < share);
+        const Footprint& footprint = footprints[block.stratum[i]];
+        const float share = footprint.wide_share;
+        const bool is_wide =
+            share >= 1.0f ||
+            (share > 0.0f &&
+             uniformFloat(mixBits(std::bit_cast<uint32_t>(block.x[i]) * 0x9e3779b9ull ^
+                                  std::bit_cast<uint32_t>(block.y[i]))) < share);
         if (is_wide) {
             splat(tile, sx[i], sy[i], block.z[i], number, 2);
-        } else {
+        } else if (std::abs(sx[i] - float(ix) - 0.5f) <= footprint.half_side &&
+                   std::abs(sy[i] - float(iy) - 0.5f) <= footprint.half_side) {
             uint64_t& slot = tile.row(iy)[ix];
             slot = std::min(slot, DepthTile::pack(block.z[i], number));
         }
@@ -92,14 +98,16 @@ void DepthPass::refreshAfter(uint64_t subpixels, DepthTile& tile) {
     }
 }
 
-void DepthPass::splat(DepthTile& tile, float sub_x, float sub_y, float depth, uint32_t number, int side) const {
+void DepthPass::splat(DepthTile& tile, float sub_x, float sub_y, float depth, uint32_t number,
+                      int side) const {
     const SubpixelRect& rect = tile.rect();
     const float half = 0.5f * float(side - 1);
     const int x0 = int(std::floor(sub_x - half)), y0 = int(std::floor(sub_y - half));
     const uint64_t key = DepthTile::pack(depth, number);
     for (int y = std::max(y0, rect.y0); y < std::min(y0 + side, rect.y1); ++y) {
         uint64_t* row = tile.row(y);
-        for (int x = std::max(x0, rect.x0); x < std::min(x0 + side, rect.x1); ++x) row[x] = std::min(row[x], key);
+        for (int x = std::max(x0, rect.x0); x < std::min(x0 + side, rect.x1); ++x)
+            row[x] = std::min(row[x], key);
     }
 }
 
@@ -110,9 +118,11 @@ uint64_t fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
     for (int y = 1; y + 1 < height; ++y) {
         for (int x = 1; x + 1 < width; ++x) {
             const uint64_t* c = scratch.data() + size_t(y) * size_t(w) + size_t(x);
-            // Opposite neighbours on a surface in front of this subpixel: something solid passes here.
+            // Opposite neighbours on a surface in front of this subpixel: something solid passes
+            // here.
             const float here = DepthTile::depthOf(*c);
-            const uint64_t around[8] = {c[-w - 1], c[-w], c[-w + 1], c[1], c[w + 1], c[w], c[w - 1], c[-1]};
+            const uint64_t around[8] = {c[-w - 1], c[-w], c[-w + 1], c[1],
+                                        c[w + 1],  c[w],  c[w - 1],  c[-1]};
             int in_front = 0;
             uint64_t nearest = DepthTile::kEmpty;
             float nearest_depth = kInfinity, farthest_front = 0.0f;
@@ -124,9 +134,11 @@ uint64_t fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
                     if (d < nearest_depth) nearest_depth = d, nearest = key;
                 }
             }
-            // All but one, and they agree on one depth within what a slanted surface spans over three subpixels.
+            // All but one, and they agree on one depth within what a slanted surface spans over
+            // three subpixels.
             if (in_front >= 7 && farthest_front < nearest_depth * 1.02f) {
-                tile.keys()[size_t(y) * size_t(w) + size_t(x)] = DepthTile::pack(farthest_front, DepthTile::numberOf(nearest));
+                tile.keys()[size_t(y) * size_t(w) + size_t(x)] =
+                    DepthTile::pack(farthest_front, DepthTile::numberOf(nearest));
                 ++changed;
             }
         }
@@ -139,7 +151,9 @@ namespace {
 class PerPixel : public TileReconstruction {
 public:
     PerPixel(const ReconstructionContext& context, int splat_subpixels)
-        : context_(context), depth_pass_(context_, splat_subpixels), splat_subpixels_(splat_subpixels) {}
+        : context_(context),
+          depth_pass_(context_, splat_subpixels),
+          splat_subpixels_(splat_subpixels) {}
 
     int passCount() const override { return 1; }
     int halo() const override { return std::max(2, splat_subpixels_ / 2 + 1); }
@@ -166,11 +180,14 @@ public:
                 PixelSums sums;
                 for (int y = py * s; y < (py + 1) * s; ++y) {
                     const uint64_t* row = tile_.row(y);
-                    for (int x = px * s; x < (px + 1) * s; ++x) addSubpixel(lookup, row[x], x, y, sums);
+                    for (int x = px * s; x < (px + 1) * s; ++x)
+                        addSubpixel(lookup, row[x], x, y, sums);
                 }
                 if (!depth_pass_.counts().empty()) {
-                    sums.points = depth_pass_.counts()[size_t(py - inner_.y0 / s) * size_t(inner_.width() / s) +
-                                                       size_t(px - inner_.x0 / s)];
+                    sums.points =
+                        depth_pass_
+                            .counts()[size_t(py - inner_.y0 / s) * size_t(inner_.width() / s) +
+                                      size_t(px - inner_.x0 / s)];
                 }
                 context_.picture->write(px, py, sums);
             }
@@ -194,7 +211,8 @@ private:
             context_.view.ray(sub_x, sub_y, origin, direction);
             last_.position_camera = origin + direction * last_.depth;
             lookup.lookUp(number, sub_x, sub_y, last_);
-            last_shaded_ = shade(last_, (*context_.materials)[last_.material], *context_.lighting, context_.view);
+            last_shaded_ = shade(last_, (*context_.materials)[last_.material], *context_.lighting,
+                                 context_.view);
             last_number_ = number;
         }
         sums.add(last_, last_shaded_);
@@ -213,7 +231,8 @@ private:
 
 }  // namespace
 
-std::unique_ptr<TileReconstruction> makePerPixel(const ReconstructionContext& context, int splat_subpixels) {
+std::unique_ptr<TileReconstruction> makePerPixel(const ReconstructionContext& context,
+                                                 int splat_subpixels) {
     return std::make_unique<PerPixel>(context, splat_subpixels);
 }
 

@@ -18,8 +18,9 @@ std::vector<std::string> channelNames(const std::vector<std::string>& aovs) {
         } else if (aov == "object" || aov == "coverage" || aov == "count") {
             names.push_back(aov);
         } else {
-            throw Error(ErrorCode::kInvalidArgument, "",
-                        "unknown AOV \"" + aov + "\" (depth, normal, albedo, object, coverage, count)");
+            throw Error(
+                ErrorCode::kInvalidArgument, "",
+                "unknown AOV \"" + aov + "\" (depth, normal, albedo, object, coverage, count)");
         }
     }
     return names;
@@ -27,11 +28,18 @@ std::vector<std::string> channelNames(const std::vector<std::string>& aovs) {
 
 }  // namespace
 
-Picture::Picture(const View& view, const Lighting& lighting, const std::vector<std::string>& aovs, bool transparent)
-    : view_(view), lighting_(lighting), transparent_(transparent), exposure_(std::exp2(lighting.exposure)),
-      image_(view.width, view.height, channelNames(aovs)), depth_(image_.channelIndex("depth")),
-      normal_(image_.channelIndex("normal.X")), albedo_(image_.channelIndex("albedo.R")),
-      object_(image_.channelIndex("object")), coverage_(image_.channelIndex("coverage")),
+Picture::Picture(const View& view, const Lighting& lighting, const std::vector<std::string>& aovs,
+                 bool transparent)
+    : view_(view),
+      lighting_(lighting),
+      transparent_(transparent),
+      exposure_(std::exp2(lighting.exposure)),
+      image_(view.width, view.height, channelNames(aovs)),
+      depth_(image_.channelIndex("depth")),
+      normal_(image_.channelIndex("normal.X")),
+      albedo_(image_.channelIndex("albedo.R")),
+      object_(image_.channelIndex("object")),
+      coverage_(image_.channelIndex("coverage")),
       count_(image_.channelIndex("count")) {}
 
 void Picture::write(int x, int y, const PixelSums& s) {
@@ -39,8 +47,10 @@ void Picture::write(int x, int y, const PixelSums& s) {
     Vec3 color = s.samples > 0.0f ? s.radiance / s.samples : Vec3(0.0f);
     if (!transparent_ && coverage < 1.0f) {
         Vec3 origin, direction;
-        view_.ray((float(x) + 0.5f) * float(view_.subpixels), (float(y) + 0.5f) * float(view_.subpixels), origin, direction);
-        const Vec3 world = glm::normalize(Mat3(glm::transpose(view_.camera_from_world)) * direction);
+        view_.ray((float(x) + 0.5f) * float(view_.subpixels),
+                  (float(y) + 0.5f) * float(view_.subpixels), origin, direction);
+        const Vec3 world =
+            glm::normalize(Mat3(glm::transpose(view_.camera_from_world)) * direction);
         color += skyRadiance(lighting_.sky, world) * (1.0f - coverage);
     }
     float* out = image_.pixel(x, y);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From shaded samples to pixels: box-filtered sums and the picture's channels. Used by every method.
+// From shaded samples to pixels: box-filtered sums and the picture's channels. Used by every
+// method.
 #pragma once
 
 #include <core/camera.h>
@@ -14,16 +15,16 @@ namespace stipple {
 
 // What one pixel gathers over its samples (subpixels or rays).
 struct PixelSums {
-    Vec3 radiance = Vec3(0);     // sum over samples with surface
+    Vec3 radiance = Vec3(0);  // sum over samples with surface
     Vec3 normal = Vec3(0);
     Vec3 albedo = Vec3(0);
-    float depth = 0.0f;          // sum
+    float depth = 0.0f;  // sum
     float depth_max = 0.0f;
     float nearest = kInfinity;
-    uint32_t object = 0;         // of the nearest sample
-    float covered = 0.0f;        // samples with surface
-    float samples = 0.0f;        // samples
-    float points = 0.0f;         // kept points that fell into the pixel
+    uint32_t object = 0;   // of the nearest sample
+    float covered = 0.0f;  // samples with surface
+    float samples = 0.0f;  // samples
+    float points = 0.0f;   // kept points that fell into the pixel
 
     void add(const SurfaceSample& s, const Vec3& shaded) {
         radiance += shaded;
@@ -41,8 +42,10 @@ struct PixelSums {
 // Lays out channels and finishes pixels: R, G, B, A, then the AOVs in the order asked for.
 class Picture {
 public:
-    // aovs: depth (adds depth_max), normal, albedo, object, coverage, count. Throws kInvalidArgument for another name.
-    Picture(const View& view, const Lighting& lighting, const std::vector<std::string>& aovs, bool transparent);
+    // aovs: depth (adds depth_max), normal, albedo, object, coverage, count. Throws
+    // kInvalidArgument for another name.
+    Picture(const View& view, const Lighting& lighting, const std::vector<std::string>& aovs,
+            bool transparent);
     // Background where samples saw nothing; exposure applied. Pixels may be written in parallel.
     void write(int x, int y, const PixelSums& sums);
     Image& image() { return image_; }

@@ -9,10 +9,12 @@ namespace stipple {
 std::unique_ptr<TileReconstruction> makeReconstruction(const ReconstructionContext& context) {
     switch (context.settings.reconstruct) {
         case Reconstruct::kSplat:
-            return makePerPixel(context,
-                                std::max(1, int(std::lround(context.settings.splat_size * context.view.subpixels))));
-        case Reconstruct::kGaussian: return makeGaussian(context);
-        case Reconstruct::kPerPixel: break;
+            return makePerPixel(context, std::max(1, int(std::lround(context.settings.splat_size *
+                                                                     context.view.subpixels))));
+        case Reconstruct::kGaussian:
+            return makeGaussian(context);
+        case Reconstruct::kPerPixel:
+            break;
     }
     return makePerPixel(context, 0);
 }

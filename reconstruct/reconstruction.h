@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The interface of all reconstructions: points and a z-buffer's triangles in, pixels of one tile out. A reconstruction works on one tile
-// at a time, in one thread, sees points in a fixed order, and may ask to see them several times (passes).
+// The interface of all reconstructions: points and a z-buffer's triangles in, pixels of one tile
+// out. A reconstruction works on one tile at a time, in one thread, sees points in a fixed order,
+// and may ask to see them several times (passes).
 #pragma once
 
 #include <core/light.h>
@@ -14,7 +15,8 @@
 
 namespace stipple {
 
-// Looks up what a number stands for. sub_x, sub_y: where it is seen, subpixel coordinates. Fills all but depth.
+// Looks up what a number stands for. sub_x, sub_y: where it is seen, subpixel coordinates. Fills
+// all but depth.
 class SampleLookup {
 public:
     virtual ~SampleLookup() = default;
@@ -33,8 +35,8 @@ struct ReconstructionContext {
 
 struct TileCounters {
     uint64_t points_drawn = 0;
-    uint64_t points_kept = 0;    // kept and within the tile proper
-    uint64_t triangles = 0;      // rasterized in tiles
+    uint64_t points_kept = 0;  // kept and within the tile proper
+    uint64_t triangles = 0;    // rasterized in tiles
 };
 
 class TileReconstruction : public PointSink {

@@ -23,26 +23,32 @@ Vec3 skyRadiance(const Sky& sky, const Vec3& direction) {
     return glm::mix(sky.horizon, sky.zenith, std::sqrt(direction.y));
 }
 
-Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting, const View& view) {
+Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
+           const View& view) {
     if (material.unlit) return sample.albedo;
-    const Vec3 to_eye_camera = view.orthographic ? Vec3(0.0f, 0.0f, -1.0f) : -sample.position_camera;
-    const Vec3 to_eye = glm::normalize(Mat3(glm::transpose(view.camera_from_world)) * to_eye_camera);
+    const Vec3 to_eye_camera =
+        view.orthographic ? Vec3(0.0f, 0.0f, -1.0f) : -sample.position_camera;
+    const Vec3 to_eye =
+        glm::normalize(Mat3(glm::transpose(view.camera_from_world)) * to_eye_camera);
     Vec3 n = sample.normal_world;
     if (material.double_sided && glm::dot(n, to_eye) < 0.0f) n = -n;
 
     Vec3 diffuse = skyAmbient(lighting.sky, n) * (1.0f - material.translucency) +
                    skyAmbient(lighting.sky, -n) * material.translucency;
     Vec3 specular(0.0f);
-    const bool has_specular = material.specular.x + material.specular.y + material.specular.z > 0.0f;
+    const bool has_specular =
+        material.specular.x + material.specular.y + material.specular.z > 0.0f;
     for (const Sun& sun : lighting.suns) {
         const float cosine = glm::dot(n, sun.direction_to_light);
-        const float lit = cosine > 0.0f ? cosine * (1.0f - material.translucency) : -cosine * material.translucency;
+        const float lit = cosine > 0.0f ? cosine * (1.0f - material.translucency)
+                                        : -cosine * material.translucency;
         diffuse += sun.irradiance * (lit * kInvPi);
         if (has_specular && cosine > 0.0f) {
             const float r = glm::dot(2.0f * cosine * n - sun.direction_to_light, to_eye);
             if (r > 0.0f) {
                 // Normalized Phong lobe, (s + 2) / (2 pi) cos^s.
-                const float lobe = (material.shininess + 2.0f) * 0.5f * kInvPi * std::pow(r, material.shininess);
+                const float lobe =
+                    (material.shininess + 2.0f) * 0.5f * kInvPi * std::pow(r, material.shininess);
                 specular += sun.irradiance * (material.specular * (lobe * cosine));
             }
         }
@@ -50,7 +56,8 @@ Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting
     Vec3 radiance = sample.albedo * diffuse + specular + material.emissive;
     if (lighting.sky.haze_distance > 0.0f) {
         const float distance = glm::length(sample.position_camera);
-        radiance = glm::mix(lighting.sky.horizon, radiance, std::exp(-distance / lighting.sky.haze_distance));
+        radiance = glm::mix(lighting.sky.horizon, radiance,
+                            std::exp(-distance / lighting.sky.haze_distance));
     }
     return radiance;
 }

@@ -24,14 +24,16 @@ constexpr float kInside = -1e-6f;
 
 // The block's triangles in the picture: vertices, bounds of the centres they may cover, edges.
 struct Projected {
-    alignas(64) float x[3][kBlockPoints], y[3][kBlockPoints], q[3][kBlockPoints];  // q: 1/z, or z in orthographic views
+    alignas(64) float x[3][kBlockPoints], y[3][kBlockPoints],
+        q[3][kBlockPoints];  // q: 1/z, or z in orthographic views
     alignas(64) float inverse_area[kBlockPoints];
     alignas(64) int x0[kBlockPoints], x1[kBlockPoints], y0[kBlockPoints], y1[kBlockPoints];
     alignas(64) float z_min[kBlockPoints];
 };
 
 template <bool kOrthographic>
-inline __attribute__((always_inline)) void projectBlock(const View& view, const TriangleBlock& block,
+inline __attribute__((always_inline)) void projectBlock(const View& view,
+                                                        const TriangleBlock& block,
                                                         const SubpixelRect& rect, Projected& p) {
     const float focal = float(view.focal), cx = float(view.center_x), cy = float(view.center_y);
     for (int k = 0; k < 3; ++k) {
@@ -43,7 +45,8 @@ inline __attribute__((always_inline)) void projectBlock(const View& view, const 
             p.q[k][i] = q;
         }
     }
-    const float left = float(rect.x0), right = float(rect.x1), top = float(rect.y0), bottom = float(rect.y1);
+    const float left = float(rect.x0), right = float(rect.x1), top = float(rect.y0),
+                bottom = float(rect.y1);
     for (int i = 0; i < kBlockPoints; ++i) {
         const float x_lo = std::min(std::min(p.x[0][i], p.x[1][i]), p.x[2][i]);
         const float x_hi = std::max(std::max(p.x[0][i], p.x[1][i]), p.x[2][i]);
@@ -61,7 +64,9 @@ inline __attribute__((always_inline)) void projectBlock(const View& view, const 
 }
 
 template <bool kOrthographic>
-inline __attribute__((always_inline)) uint64_t rasterize(const View& view, const TriangleBlock& block, DepthTile& tile) {
+inline __attribute__((always_inline)) uint64_t rasterize(const View& view,
+                                                         const TriangleBlock& block,
+                                                         DepthTile& tile) {
     Projected p;
     projectBlock<kOrthographic>(view, block, tile.rect(), p);
     uint64_t visited = 0;
@@ -71,7 +76,8 @@ inline __attribute__((always_inline)) uint64_t rasterize(const View& view, const
         if (x0 > x1 || y0 > y1 || inverse == 0.0f) continue;
         if (tile.hides({x0, y0, x1 + 1, y1 + 1}, p.z_min[i])) continue;
         visited += uint64_t(x1 - x0 + 1) * uint64_t(y1 - y0 + 1);
-        // Barycentrics are affine in the picture; so is 1/z in perspective, and z in orthographic views.
+        // Barycentrics are affine in the picture; so is 1/z in perspective, and z in orthographic
+        // views.
         const float ax = p.x[0][i], ay = p.y[0][i];
         const float ub_x = (p.y[2][i] - ay) * inverse, ub_y = -(p.x[2][i] - ax) * inverse;
         const float uc_x = -(p.y[1][i] - ay) * inverse, uc_y = (p.x[1][i] - ax) * inverse;
@@ -84,11 +90,14 @@ inline __attribute__((always_inline)) uint64_t rasterize(const View& view, const
             if (block.mask) {
                 for (int x = x0; x <= x1; ++x) {
                     const float dx = float(x) + 0.5f - ax;
-                    const float ub = dx * ub_x + ub_row, uc = dx * uc_x + uc_row, ua = 1.0f - ub - uc;
+                    const float ub = dx * ub_x + ub_row, uc = dx * uc_x + uc_row,
+                                ua = 1.0f - ub - uc;
                     if (std::min(std::min(ua, ub), uc) < kInside) continue;
                     const float value = q0 + dq1 * ub + dq2 * uc;
-                    const uint64_t key = DepthTile::pack(kOrthographic ? value : 1.0f / value, number);
-                    if (key < row[x] && block.mask->isSurface(i, float(x) + 0.5f, float(y) + 0.5f)) row[x] = key;
+                    const uint64_t key =
+                        DepthTile::pack(kOrthographic ? value : 1.0f / value, number);
+                    if (key < row[x] && block.mask->isSurface(i, float(x) + 0.5f, float(y) + 0.5f))
+                        row[x] = key;
                 }
                 continue;
             }
@@ -99,7 +108,8 @@ inline __attribute__((always_inline)) uint64_t rasterize(const View& view, const
                 const Float8 value = q0 + dq1 * ub + dq2 * uc;
                 const Float8 depth = kOrthographic ? value : 1.0f / value;
                 const Int8 is_inside = (ua >= kInside) & (ub >= kInside) & (uc >= kInside);
-                const Key8 key = __builtin_convertvector((Int8)depth, Key8) << 32 | uint64_t(number);
+                const Key8 key =
+                    __builtin_convertvector((Int8)depth, Key8) << 32 | uint64_t(number);
                 Key8 old;
                 std::memcpy(&old, row + x, sizeof old);
                 const Long8 take = __builtin_convertvector(is_inside, Long8) & (key < old);
@@ -113,9 +123,10 @@ inline __attribute__((always_inline)) uint64_t rasterize(const View& view, const
 
 }  // namespace
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) uint64_t rasterizeTriangles(
-    const View& view, const TriangleBlock& block, DepthTile& tile) {
-    return view.orthographic ? rasterize<true>(view, block, tile) : rasterize<false>(view, block, tile);
+__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) uint64_t
+rasterizeTriangles(const View& view, const TriangleBlock& block, DepthTile& tile) {
+    return view.orthographic ? rasterize<true>(view, block, tile)
+                             : rasterize<false>(view, block, tile);
 }
 
 }  // namespace stipple

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small triangles straight into a tile's z-buffer, at subpixel centres.
-// why: OSMesa sees a frame's triangles before the tiles and cannot skip what tiles find hidden; near foliage has tens of millions of
-// triangles of a few subpixels of which most are hidden.
+// why: OSMesa sees a frame's triangles before the tiles and cannot skip what tiles find hidden;
+// near foliage has tens of millions of triangles of a few subpixels of which most are hidden.
 #pragma once
 
 #include <core/camera.h>

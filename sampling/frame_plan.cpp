@@ -19,8 +19,12 @@ struct Pending {
 
 class Planner {
 public:
-    Planner(const Scene& scene, const View& view, const RenderSettings& settings, bool rasterize_all)
-        : scene_(scene), view_(view), settings_(settings), rasterize_all_(rasterize_all),
+    Planner(const Scene& scene, const View& view, const RenderSettings& settings,
+            bool rasterize_all)
+        : scene_(scene),
+          view_(view),
+          settings_(settings),
+          rasterize_all_(rasterize_all),
           max_size_(float(settings.tile_size)) {}
 
     FramePlan plan;
@@ -34,17 +38,19 @@ private:
     void visitGroup(const Pending& p, std::vector<Pending>& opened) {
         const Group& group = scene_.groups[p.child.index()];
         const GroupNode& node = group.nodes[p.node];
-        const BoxProjection box =
-            projectBox(view_, p.camera_from_child.linear, p.camera_from_child.translation, node.bounds);
+        const BoxProjection box = projectBox(view_, p.camera_from_child.linear,
+                                             p.camera_from_child.translation, node.bounds);
         if (!box.is_visible || !(node.area > 0.0)) return;
         const double bound = box.bound * maxAreaScale(p.camera_from_child.linear);
-        const bool has_large = rasterize_all_ || node.max_triangle_area * bound > settings_.large_triangle;
+        const bool has_large =
+            rasterize_all_ || node.max_triangle_area * bound > settings_.large_triangle;
         if (!has_large && box.size <= max_size_) {
             addBatch(p, box, node.area * bound);
             return;
         }
         for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
-            opened.push_back({p.camera_from_child * group.instances.groupFromChild(i), group.instances.child(i), 0,
+            opened.push_back({p.camera_from_child * group.instances.groupFromChild(i),
+                              group.instances.child(i), 0,
                               extendObjectPath(p.path, group.listed_index[i])});
         }
         for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c) {
@@ -55,18 +61,20 @@ private:
     void visitMesh(const Pending& p) {
         const Mesh& mesh = scene_.meshes[p.child.index()];
         if (mesh.triangles.empty()) return;
-        const BoxProjection box =
-            projectBox(view_, p.camera_from_child.linear, p.camera_from_child.translation, mesh.nodes[0].bounds);
+        const BoxProjection box = projectBox(view_, p.camera_from_child.linear,
+                                             p.camera_from_child.translation, mesh.nodes[0].bounds);
         if (!box.is_visible) return;
         const double area_scale = maxAreaScale(p.camera_from_child.linear);
-        if (rasterize_all_ || mesh.nodes[0].max_triangle_area * box.bound * area_scale > settings_.large_triangle) {
+        if (rasterize_all_ ||
+            mesh.nodes[0].max_triangle_area * box.bound * area_scale > settings_.large_triangle) {
             collectLargeTriangles(p, mesh, area_scale);
         }
         if (!rasterize_all_) addMeshBatches(p, mesh, box, area_scale);
     }
 
     // Parts no larger than a tile, so that they sort among the other batches.
-    void addMeshBatches(const Pending& p, const Mesh& mesh, const BoxProjection& box, double area_scale) {
+    void addMeshBatches(const Pending& p, const Mesh& mesh, const BoxProjection& box,
+                        double area_scale) {
         const MeshNode& node = mesh.nodes[p.node];
         if (!box.is_visible) return;
         if (box.size <= max_size_ || node.child_count == 0) {
@@ -74,8 +82,9 @@ private:
             return;
         }
         for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c) {
-            const BoxProjection child = projectBox(view_, p.camera_from_child.linear, p.camera_from_child.translation,
-                                                   mesh.nodes[c].bounds);
+            const BoxProjection child =
+                projectBox(view_, p.camera_from_child.linear, p.camera_from_child.translation,
+                           mesh.nodes[c].bounds);
             addMeshBatches({p.camera_from_child, p.child, c, p.path}, mesh, child, area_scale);
         }
     }
@@ -86,18 +95,19 @@ private:
         while (!stack_.empty()) {
             const MeshNode& node = mesh.nodes[stack_.back()];
             stack_.pop_back();
-            const BoxProjection box =
-                projectBox(view_, p.camera_from_child.linear, p.camera_from_child.translation, node.bounds);
+            const BoxProjection box = projectBox(view_, p.camera_from_child.linear,
+                                                 p.camera_from_child.translation, node.bounds);
             if (!box.is_visible) continue;
             if (rasterize_all_) {
-                if (node.child_count == 0 || box.is_inside || node.triangle_count <= kCullTriangles) {
+                if (node.child_count == 0 || box.is_inside ||
+                    node.triangle_count <= kCullTriangles) {
                     addRange(range_begin, node);
                     continue;
                 }
             } else {
-                if (node.max_triangle_area * box.bound * area_scale <= settings_.large_triangle) continue;
-                double density;
-                const NodeClass node_class = classifyNode(mesh, node, box, area_scale, settings_, density);
+                if (node.max_triangle_area * box.bound * area_scale <= settings_.large_triangle)
+                    continue;
+                const NodeClass node_class = classifyNode(node, box, area_scale, settings_);
                 if (node_class == NodeClass::kLargeTriangles) addRange(range_begin, node);
                 if (node_class != NodeClass::kOpen) continue;
             }
@@ -112,7 +122,8 @@ private:
         draw.range_begin = range_begin;
         draw.range_count = range_count;
         plan.raster.draws.push_back(draw);
-        plan.raster_instances.push_back({makeInstanceFrame(view_, p.camera_from_child, p.path), p.child.index()});
+        plan.raster_instances.push_back(
+            {makeInstanceFrame(view_, p.camera_from_child, p.path), p.child.index()});
     }
 
     void addBatch(const Pending& p, const BoxProjection& box, double expected_area) {
@@ -128,7 +139,8 @@ private:
     void addRange(uint32_t range_begin, const MeshNode& node) {
         plan.raster_triangles += node.triangle_count;
         auto& ranges = plan.raster.ranges;
-        if (ranges.size() > range_begin && ranges.back().first + ranges.back().count == node.first_triangle) {
+        if (ranges.size() > range_begin &&
+            ranges.back().first + ranges.back().count == node.first_triangle) {
             ranges.back().count += node.triangle_count;
         } else {
             ranges.push_back({node.first_triangle, node.triangle_count});
@@ -146,7 +158,9 @@ private:
 void append(FramePlan& all, FramePlan& part) {
     const uint32_t batch_offset = uint32_t(all.batches.size());
     const uint32_t range_offset = uint32_t(all.raster.ranges.size());
-    const auto addAll = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    const auto addAll = [](auto& to, const auto& from) {
+        to.insert(to.end(), from.begin(), from.end());
+    };
     for (Batch& b : part.batches) b.index += batch_offset;
     for (RasterDraw& d : part.raster.draws) d.range_begin += range_offset;
     addAll(all.nodes, part.nodes);
@@ -171,14 +185,15 @@ void numberTriangles(FramePlan& plan) {
         next += highest - lowest;
     }
     if (next >= 0x80000000ull) {
-        throw Error(ErrorCode::kUnsupported, "", "more than 2^31 triangles would be rasterized in one frame");
+        throw Error(ErrorCode::kUnsupported, "",
+                    "more than 2^31 triangles would be rasterized in one frame");
     }
 }
 
 }  // namespace
 
-FramePlan planFrame(const Scene& scene, const View& view, const RenderSettings& settings, bool rasterize_all,
-                    ThreadPool& pool, const CancelFlag* cancel) {
+FramePlan planFrame(const Scene& scene, const View& view, const RenderSettings& settings,
+                    bool rasterize_all, ThreadPool& pool, const CancelFlag* cancel) {
     Affine camera_from_world;
     camera_from_world.linear = view.camera_from_world;
     camera_from_world.translation = -(view.camera_from_world * view.eye_world);

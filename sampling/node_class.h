@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// What becomes of a mesh node in a view: points, triangles rasterized tile by tile, triangles for the z-buffer, or opened.
-// Based on: Wand et al. 2001 ("Choosing Groups", "Handling of large triangles: additional classification by triangle area").
+// What becomes of a mesh node in a view: points, triangles rasterized tile by tile, triangles for
+// the z-buffer, or opened. Based on: Wand et al. 2001 ("Choosing Groups", "Handling of large
+// triangles: additional classification by triangle area").
 #pragma once
 
 #include <core/settings.h>
-#include <sampling/opacity.h>
 #include <sampling/projection.h>
 #include <scenegraph/mesh.h>
 
@@ -16,29 +16,25 @@ enum class NodeClass { kOpen, kPoints, kTriangles, kLargeTriangles };
 inline constexpr double kFewPoints = 16.0;
 // Larger runs of large triangles are opened to find parts outside the frustum.
 inline constexpr uint32_t kCullTriangles = 4096;
-// A batch is drawn anew in each tile it touches, so what is drawn as points is opened to this share of a tile.
+// A batch is drawn anew in each tile it touches, so what is drawn as points is opened to this share
+// of a tile.
 inline constexpr float kTileShare = 0.25f;
 
-// K for patches of that area in subpixels: what is finer than a subpixel needs no more than one point per subpixel.
-inline double wantedDensity(const RenderSettings& settings, double patch_subpixels) {
-    return settings.samples * patchOpacity(float(std::sqrt(patch_subpixels)), float(settings.samples));
-}
-
-// density: wanted points per subpixel (out). area_scale: largest area scale of the instance. Depends on nothing but the node and the view,
-// so planning and drawing agree.
-inline NodeClass classifyNode(const Mesh& mesh, const MeshNode& node, const BoxProjection& box, double area_scale,
-                              const RenderSettings& settings, double& density) {
+// area_scale: largest area scale of the instance. Depends on nothing but the node and the view, so
+// planning and drawing agree.
+inline NodeClass classifyNode(const MeshNode& node, const BoxProjection& box, double area_scale,
+                              const RenderSettings& settings) {
     const bool is_leaf = node.child_count == 0;
     const bool is_mixed = node.stratum == kMixedStratum;
     const double bound = box.bound * area_scale;
     const double largest = node.max_triangle_area * bound;
     if (largest <= settings.area_threshold) {
-        const double patch = is_mixed ? double(mesh.max_patch_area) : double(mesh.strata[node.stratum].patch_area);
-        density = wantedDensity(settings, patch * bound);
-        const double n = density * bound * node.area;
-        const bool fits = box.size <= kTileShare * float(settings.tile_size) && n <= settings.list_length;
+        const double n = settings.samples * bound * node.area;
+        const bool fits =
+            box.size <= kTileShare * float(settings.tile_size) && n <= settings.list_length;
         const bool is_uniform = box.depth_ratio <= settings.cut_ratio;
-        return is_leaf || (is_uniform && (fits || n <= kFewPoints)) ? NodeClass::kPoints : NodeClass::kOpen;
+        return is_leaf || (is_uniform && (fits || n <= kFewPoints)) ? NodeClass::kPoints
+                                                                    : NodeClass::kOpen;
     }
     if (is_mixed) return is_leaf ? NodeClass::kTriangles : NodeClass::kOpen;
     // What is large at the far end of the box is large everywhere in it.

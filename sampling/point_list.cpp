@@ -21,7 +21,9 @@ const std::array<float, 256>& srgbTable() {
     return table;
 }
 
-uint32_t to8(float linear) { return uint32_t(srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f); }
+uint32_t to8(float linear) {
+    return uint32_t(srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f);
+}
 
 }  // namespace
 
@@ -53,7 +55,8 @@ Vec3 unpackSrgb8(uint32_t p) {
     return Vec3(table[p & 255], table[p >> 8 & 255], table[p >> 16 & 255]);
 }
 
-MeshPoint drawMeshPoint(const Mesh& mesh, const MeshNode& node, Sampler sampler, uint64_t key, uint32_t index) {
+MeshPoint drawMeshPoint(const Mesh& mesh, const MeshNode& node, Sampler sampler, uint64_t key,
+                        uint32_t index) {
     const double* cumulative = mesh.cumulative_area.data();
     const uint32_t first = node.first_triangle, count = node.triangle_count;
     const double begin = cumulative[first], area = cumulative[first + count] - begin;
@@ -66,11 +69,14 @@ MeshPoint drawMeshPoint(const Mesh& mesh, const MeshNode& node, Sampler sampler,
         t -= std::floor(t);
     }
     const double target = begin + t * area;
-    const double* found = std::upper_bound(cumulative + first + 1, cumulative + first + count, target);
+    const double* found =
+        std::upper_bound(cumulative + first + 1, cumulative + first + count, target);
     MeshPoint p;
     p.triangle = uint32_t(found - cumulative) - 1;
     const double triangle_area = cumulative[p.triangle + 1] - cumulative[p.triangle];
-    double r = triangle_area > 0.0 ? std::clamp((target - cumulative[p.triangle]) / triangle_area, 0.0, 1.0) : 0.0;
+    double r = triangle_area > 0.0
+                   ? std::clamp((target - cumulative[p.triangle]) / triangle_area, 0.0, 1.0)
+                   : 0.0;
     if (sampler == Sampler::kRandom) {
         const float a = std::sqrt(float(r)), b = uniformFloat(hashCombine(key, index, 1));
         p.u = a * (1.0f - b), p.v = a * b;
@@ -84,10 +90,18 @@ MeshPoint drawMeshPoint(const Mesh& mesh, const MeshNode& node, Sampler sampler,
         r -= d;
         const Vec2 ab = 0.5f * (a + b), bc = 0.5f * (b + c), ca = 0.5f * (c + a);
         switch (d) {
-            case 0: a = bc, b = ca, c = ab; break;
-            case 1: b = ab, c = ca; break;
-            case 2: a = ab, c = bc; break;
-            default: a = ca, b = bc; break;
+            case 0:
+                a = bc, b = ca, c = ab;
+                break;
+            case 1:
+                b = ab, c = ca;
+                break;
+            case 2:
+                a = ab, c = bc;
+                break;
+            default:
+                a = ca, b = bc;
+                break;
         }
     }
     // What is left is placed at random within the last sub-triangle.
@@ -105,14 +119,16 @@ struct PointLists::List {
 };
 
 PointLists::PointLists(const Scene& scene) : scene_(scene) {
-    for (const Mesh& mesh : scene.meshes) slots_.push_back(std::make_unique<Slot[]>(mesh.nodes.size()));
+    for (const Mesh& mesh : scene.meshes)
+        slots_.push_back(std::make_unique<Slot[]>(mesh.nodes.size()));
 }
 
 PointLists::~PointLists() { clear(); }
 
 void PointLists::clear() {
     for (size_t m = 0; m < slots_.size(); ++m) {
-        for (size_t n = 0; n < scene_.meshes[m].nodes.size(); ++n) delete slots_[m][n].list.exchange(nullptr);
+        for (size_t n = 0; n < scene_.meshes[m].nodes.size(); ++n)
+            delete slots_[m][n].list.exchange(nullptr);
     }
     retired_.clear();
     bytes_ = 0;
@@ -139,7 +155,8 @@ void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
     ++frame_;
 }
 
-void PointLists::makePoints(uint32_t mesh_index, uint32_t node_index, uint32_t first, int count, ListBlock& out) const {
+void PointLists::makePoints(uint32_t mesh_index, uint32_t node_index, uint32_t first, int count,
+                            ListBlock& out) const {
     const Mesh& mesh = scene_.meshes[mesh_index];
     const MeshNode& node = mesh.nodes[node_index];
     const uint64_t key = hashCombine(identity_.seed, mesh_index, node_index);
@@ -150,11 +167,14 @@ void PointLists::makePoints(uint32_t mesh_index, uint32_t node_index, uint32_t f
         const uint32_t index = first + uint32_t(lane);
         const MeshPoint p = drawMeshPoint(mesh, node, identity_.sampler, key, index);
         const UVec3& t = mesh.triangles[p.triangle];
-        const Vec3 a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a, e2 = mesh.positions[t.z] - a;
+        const Vec3 a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a,
+                   e2 = mesh.positions[t.z] - a;
         const Vec3 position = a + e1 * p.u + e2 * p.v;
         const DVec3 n = glm::normalize(glm::cross(DVec3(e1), DVec3(e2)));
         for (int axis = 0; axis < 3; ++axis) {
-            const float q = extent[axis] > 0.0f ? (position[axis] - node.bounds.min[axis]) / extent[axis] : 0.0f;
+            const float q = extent[axis] > 0.0f
+                                ? (position[axis] - node.bounds.min[axis]) / extent[axis]
+                                : 0.0f;
             out.position[axis][lane] = uint16_t(std::clamp(q, 0.0f, 1.0f) * 65535.0f + 0.5f);
             out.normal[axis][lane] = int16_t(std::lround(n[axis] * 32767.0));
         }
@@ -164,8 +184,8 @@ void PointLists::makePoints(uint32_t mesh_index, uint32_t node_index, uint32_t f
         const Material& material = scene_.materials[material_index];
         const bool is_there = material.alpha_mode == AlphaMode::kOpaque ||
                               (material.alpha_mode == AlphaMode::kMask
-                                   ? alphaAt(mesh, scene_.materials, scene_.textures, p.triangle, p.u, p.v) >=
-                                         material.alpha_cutoff
+                                   ? alphaAt(mesh, scene_.materials, scene_.textures, p.triangle,
+                                             p.u, p.v) >= material.alpha_cutoff
                                    : uniformFloat(hashCombine(key, index, 3)) < surface.alpha);
         out.stratum[lane] = is_there ? mesh.triangle_stratum[p.triangle] : kNoSurface;
         out.shading_normal[lane] = packOctahedral(surface.normal_object);
@@ -188,7 +208,8 @@ PointLists::List* PointLists::grow(Slot& slot, uint32_t mesh, uint32_t node, uin
     list->blocks = std::make_unique_for_overwrite<ListBlock[]>(capacity);
     const uint32_t have = old ? old->block_count : 0;
     if (old) std::memcpy(list->blocks.get(), old->blocks.get(), have * sizeof(ListBlock));
-    for (uint32_t b = have; b < capacity; ++b) makePoints(mesh, node, b * kBlockPoints, kBlockPoints, list->blocks[b]);
+    for (uint32_t b = have; b < capacity; ++b)
+        makePoints(mesh, node, b * kBlockPoints, kBlockPoints, list->blocks[b]);
     List* result = list.release();
     slot.list.store(result, std::memory_order_release);
     if (old) {
@@ -200,8 +221,8 @@ PointLists::List* PointLists::grow(Slot& slot, uint32_t mesh, uint32_t node, uin
     return result;
 }
 
-const ListBlock& PointLists::points(uint32_t mesh, uint32_t node, uint32_t first, int count, uint32_t list_length,
-                                    ListBlock& scratch, int& first_lane) {
+const ListBlock& PointLists::points(uint32_t mesh, uint32_t node, uint32_t first, int count,
+                                    uint32_t list_length, ListBlock& scratch, int& first_lane) {
     const uint32_t block = first / kBlockPoints;
     if (budget_ > 0 && first < list_length) {
         Slot& slot = slots_[mesh][node];

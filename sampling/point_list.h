@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The points of a mesh node: an endless sequence, each point a pure function of (seed, mesh, node, index), and a cache of the
-// sequences' beginnings. With the stratified sampler every prefix is well spread over the node's area: the index, bit-reversed, runs
-// along the distribution list, whose triangles are in Morton order.
-// Based on: Wand et al. 2001 ("Precomputation: Distribution List", "Sample caching"); van der Corput sequence; Basu, Owen. Low
-// discrepancy constructions in the triangle. 2015 (the remainder steers a 4-way subdivision of the triangle).
+// The points of a mesh node: an endless sequence, each point a pure function of (seed, mesh, node,
+// index), and a cache of the sequences' beginnings. With the stratified sampler every prefix is
+// well spread over the node's area: the index, bit-reversed, runs along the distribution list,
+// whose triangles are in Morton order. Based on: Wand et al. 2001 ("Precomputation: Distribution
+// List", "Sample caching"); van der Corput sequence; Basu, Owen. Low discrepancy constructions in
+// the triangle. 2015 (the remainder steers a 4-way subdivision of the triangle).
 #pragma once
 
 #include <core/points.h>
@@ -40,7 +41,8 @@ struct MeshPoint {
 };
 
 // Point `index` of a node's sequence, uniform over the node's area.
-MeshPoint drawMeshPoint(const Mesh& mesh, const MeshNode& node, Sampler sampler, uint64_t key, uint32_t index);
+MeshPoint drawMeshPoint(const Mesh& mesh, const MeshNode& node, Sampler sampler, uint64_t key,
+                        uint32_t index);
 
 // Names the sequences: everything their points depend on.
 struct ListIdentity {
@@ -54,14 +56,15 @@ public:
     explicit PointLists(const Scene& scene);
     ~PointLists();
 
-    // Call between frames: sets the identity (a new one empties the cache) and the budget; above it, lists that were not used in
-    // the last frame are dropped.
+    // Call between frames: sets the identity (a new one empties the cache) and the budget; above
+    // it, lists that were not used in the last frame are dropped.
     void startFrame(const ListIdentity& identity, size_t budget_bytes);
-    // Points [first, first + count) of a node's sequence, which must not cross a multiple of 64: lanes [first_lane, first_lane + count) of the
-    // block returned. From the cache, which first grows to `list_length` points if the budget allows, else made in `scratch`. The
-    // same bits either way. Thread-safe.
-    const ListBlock& points(uint32_t mesh, uint32_t node, uint32_t first, int count, uint32_t list_length,
-                            ListBlock& scratch, int& first_lane);
+    // Points [first, first + count) of a node's sequence, which must not cross a multiple of 64:
+    // lanes [first_lane, first_lane + count) of the block returned. From the cache, which first
+    // grows to `list_length` points if the budget allows, else made in `scratch`. The same bits
+    // either way. Thread-safe.
+    const ListBlock& points(uint32_t mesh, uint32_t node, uint32_t first, int count,
+                            uint32_t list_length, ListBlock& scratch, int& first_lane);
     size_t bytes() const { return bytes_.load(std::memory_order_relaxed); }
 
 private:
@@ -81,10 +84,10 @@ private:
     size_t budget_ = 0;
     std::atomic<size_t> bytes_{0};
     uint32_t frame_ = 0;
-    std::mutex mutex_;                       // guards retired_
+    std::mutex mutex_;  // guards retired_
     std::vector<std::unique_ptr<List>> retired_;
     static constexpr int kStripes = 64;
-    std::mutex stripes_[kStripes];           // one list grows at a time in each stripe
+    std::mutex stripes_[kStripes];  // one list grows at a time in each stripe
 };
 
 }  // namespace stipple

@@ -10,7 +10,8 @@ double projectionFactor(const View& view, const DVec3& p, const DVec3& n) {
     return f2 * std::abs(glm::dot(n, p)) / (p.z * p.z * p.z);
 }
 
-BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& translation, const Box3& box) {
+BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& translation,
+                         const Box3& box) {
     BoxProjection r;
     if (box.isEmpty()) return r;
     const DVec3 center = linear * DVec3(box.center()) + translation;
@@ -24,7 +25,8 @@ BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& tra
     const double width = view.subWidth(), height = view.subHeight();
     const auto planeRange = [&](const DVec3& n, double offset, double& lo, double& hi) {
         const double c = glm::dot(n, center) + offset;
-        const double e = std::abs(glm::dot(n, ax)) + std::abs(glm::dot(n, ay)) + std::abs(glm::dot(n, az));
+        const double e =
+            std::abs(glm::dot(n, ax)) + std::abs(glm::dot(n, ay)) + std::abs(glm::dot(n, az));
         lo = c - e, hi = c + e;
     };
     const double f = view.focal;
@@ -62,7 +64,8 @@ BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& tra
         stretch = std::max(stretch, x * x + y * y);
     }
     const auto clampTo = [](double v, double limit) { return int(std::clamp(v, 0.0, limit)); };
-    r.rect = {clampTo(std::floor(view.center_x + x0 * f), width), clampTo(std::floor(view.center_y + y0 * f), height),
+    r.rect = {clampTo(std::floor(view.center_x + x0 * f), width),
+              clampTo(std::floor(view.center_y + y0 * f), height),
               clampTo(std::floor(view.center_x + x1 * f) + 1.0, width),
               clampTo(std::floor(view.center_y + y1 * f) + 1.0, height)};
     r.size = float(std::max(x1 - x0, y1 - y0) * f);

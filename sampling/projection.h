@@ -8,23 +8,26 @@
 
 namespace stipple {
 
-// prj(x) = f^2 * (1/z^2) * (cos beta / cos alpha) in subpixels per area; orthographic: f^2 * cos beta. normal_camera need not face
-// the eye; its length counts as area.
+// prj(x) = f^2 * (1/z^2) * (cos beta / cos alpha) in subpixels per area; orthographic: f^2 * cos
+// beta. normal_camera need not face the eye; its length counts as area.
 double projectionFactor(const View& view, const DVec3& p_camera, const DVec3& normal_camera);
 
 // What a box looks like from the eye.
 struct BoxProjection {
-    bool is_visible = false;     // may touch the frustum
-    bool is_inside = false;      // lies wholly within it
-    float z_min = 0.0f;          // at least near_z
+    bool is_visible = false;  // may touch the frustum
+    bool is_inside = false;   // lies wholly within it
+    float z_min = 0.0f;       // at least near_z
     float z_max = 0.0f;
-    SubpixelRect rect;           // clipped to the picture
-    float size = 0.0f;           // larger side of the unclipped rectangle, subpixels; infinite if it reaches behind near_z
-    double depth_ratio = 1.0;    // z_max / z_min; infinite if it reaches behind near_z
-    double bound = 0.0;          // largest projection factor of a unit area with unit area scale, whatever its orientation
+    SubpixelRect rect;  // clipped to the picture
+    float size = 0.0f;  // larger side of the unclipped rectangle, subpixels; infinite if it reaches
+                        // behind near_z
+    double depth_ratio = 1.0;  // z_max / z_min; infinite if it reaches behind near_z
+    double bound = 0.0;  // largest projection factor of a unit area with unit area scale, whatever
+                         // its orientation
 };
 
 // p_camera = linear * p + translation for p in the box.
-BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& translation, const Box3& box);
+BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& translation,
+                         const Box3& box);
 
 }  // namespace stipple

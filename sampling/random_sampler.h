@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The randomized sampler: the point source of the randomized z-buffer.
-// Based on: Wand, Fischer, Peter, Meyer auf der Heide, Strasser. The Randomized z-Buffer Algorithm. 2001.
+// Based on: Wand, Fischer, Peter, Meyer auf der Heide, Strasser. The Randomized z-Buffer Algorithm.
+// 2001.
 #pragma once
 
 #include <core/points.h>
@@ -14,7 +15,8 @@ public:
     explicit RandomizedSampler(const Scene& scene) : scene_(scene), lists_(scene) {}
 
     // Plans a frame; the plan stays until the next call.
-    const FramePlan& plan(const View& view, const RenderSettings& settings, ThreadPool& pool, const CancelFlag* cancel);
+    const FramePlan& plan(const View& view, const RenderSettings& settings, ThreadPool& pool,
+                          const CancelFlag* cancel);
     std::unique_ptr<TileEmitter> makeEmitter() override;
     size_t cacheBytes() const { return lists_.bytes(); }
 
@@ -26,8 +28,9 @@ private:
     FramePlan plan_;
 };
 
-// Attributes of a rasterized triangle `number` of the plan at subpixel coordinates; sets position_camera too.
-void rasterAttributes(const Scene& scene, const View& view, const FramePlan& plan, uint32_t number, float sub_x,
-                      float sub_y, SurfaceSample& sample);
+// Attributes of a rasterized triangle `number` of the plan at subpixel coordinates; sets
+// position_camera too.
+void rasterAttributes(const Scene& scene, const View& view, const FramePlan& plan, uint32_t number,
+                      float sub_x, float sub_y, SurfaceSample& sample);
 
 }  // namespace stipple

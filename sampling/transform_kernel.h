@@ -7,26 +7,26 @@
 
 namespace stipple {
 
-// One node of one instance, as seen from the eye. Positions are taken relative to the eye in object space, in double, before they
-// become float.
+// One node of one instance, as seen from the eye. Positions are taken relative to the eye in object
+// space, in double, before they become float.
 struct KernelParams {
-    Vec3 box_from_eye = Vec3(0);     // the node box's minimum minus the eye, object space
-    Vec3 step = Vec3(0);             // object-space size of one quantization step
+    Vec3 box_from_eye = Vec3(0);  // the node box's minimum minus the eye, object space
+    Vec3 step = Vec3(0);          // object-space size of one quantization step
     Mat3 camera_from_object = Mat3(1.0f);
     bool orthographic = false;
-    Vec3 facing = Vec3(0);           // orthographic: object-space vector d with prj = f^2 |n.d|
-    // By stratum: times |n.d| (/ z^3 in perspective; n is unit * 32767) this is the probability to keep a point seen from the front
-    // or from behind. 0 where nothing shall be seen.
+    Vec3 facing = Vec3(0);  // orthographic: object-space vector d with prj = f^2 |n.d|
+    // By stratum: times |n.d| (/ z^3 in perspective; n is unit * 32767) this is the probability to
+    // keep a point seen from the front or from behind. 0 where nothing shall be seen.
     alignas(64) float gain_front[16] = {};
     alignas(64) float gain_back[16] = {};
-    float z_near = 0.0f;             // nearer points are dropped
-    bool random = false;             // thinning numbers: hashed, or a golden-ratio sequence
+    float z_near = 0.0f;  // nearer points are dropped
+    bool random = false;  // thinning numbers: hashed, or a golden-ratio sequence
     uint32_t hash = 0;
 };
 
-// Fills out.x, y, z and keep for lanes [0, out.count) from list lanes [first_lane, first_lane + count); first_index is the list index
-// of the first. Same bits on every instruction set.
-void transformPoints(const KernelParams& params, const ListBlock& block, int first_lane, uint32_t first_index,
-                     PointBlock& out);
+// Fills out.x, y, z and keep for lanes [0, out.count) from list lanes [first_lane, first_lane +
+// count); first_index is the list index of the first. Same bits on every instruction set.
+void transformPoints(const KernelParams& params, const ListBlock& block, int first_lane,
+                     uint32_t first_index, PointBlock& out);
 
 }  // namespace stipple

@@ -16,21 +16,20 @@ struct ChildSums {
     DBox3 bounds;
     double area = 0.0;
     float max_triangle_area = 0.0f;
-    float max_patch_area = 0.0f;
 };
 
 ChildSums childSums(const Scene& scene, ChildRef child) {
     ChildSums sums;
     if (child.isGroup()) {
         const Group& g = scene.groups[child.index()];
-        sums = {g.bounds, g.area, g.max_triangle_area, g.max_patch_area};
+        sums = {g.bounds, g.area, g.max_triangle_area};
     } else {
         const Mesh& m = scene.meshes[child.index()];
-        if (!m.bounds.isEmpty()) sums.bounds.extend(DVec3(m.bounds.min)), sums.bounds.extend(DVec3(m.bounds.max));
+        if (!m.bounds.isEmpty())
+            sums.bounds.extend(DVec3(m.bounds.min)), sums.bounds.extend(DVec3(m.bounds.max));
         sums.area = m.area;
         for (const Stratum& s : m.strata) {
             sums.max_triangle_area = std::max(sums.max_triangle_area, s.max_triangle_area);
-            sums.max_patch_area = std::max(sums.max_patch_area, s.patch_area);
         }
     }
     return sums;
@@ -43,15 +42,17 @@ ChildSums instanceSums(const Scene& scene, const Group& group, size_t i) {
     sums.bounds = transformBox(transform, sums.bounds);
     sums.area *= scale;
     sums.max_triangle_area *= float(scale);
-    sums.max_patch_area *= float(scale);
     return sums;
 }
 
-// Sort key of an instance: the first code of the cell it resides in, then the level (parents before children).
+// Sort key of an instance: the first code of the cell it resides in, then the level (parents before
+// children).
 struct CellKey {
     uint64_t code;
     uint32_t level;
-    bool operator<(const CellKey& o) const { return code != o.code ? code < o.code : level < o.level; }
+    bool operator<(const CellKey& o) const {
+        return code != o.code ? code < o.code : level < o.level;
+    }
 };
 
 class GroupOctree {
@@ -66,7 +67,8 @@ public:
     }
 
 private:
-    // Makes nodes[index] the node over instances [begin, end), which lie in one cell of `level` or below it.
+    // Makes nodes[index] the node over instances [begin, end), which lie in one cell of `level` or
+    // below it.
     void fill(uint32_t index, uint32_t begin, uint32_t end, uint32_t level) {
         GroupNode node;
         node.first = begin;
@@ -84,7 +86,6 @@ private:
             bounds.extend(sums.bounds);
             node.area += sums.area;
             node.max_triangle_area = std::max(node.max_triangle_area, sums.max_triangle_area);
-            node.max_patch_area = std::max(node.max_patch_area, sums.max_patch_area);
         }
         if (split < end) {
             const int shift = 3 * (kMortonLevels - 1 - int(level));
@@ -96,7 +97,8 @@ private:
                 ranges.emplace_back(b, e);
                 b = e;
             }
-            if (ranges.size() == 1 && node.resident_count == 0) return fill(index, begin, end, level + 1);
+            if (ranges.size() == 1 && node.resident_count == 0)
+                return fill(index, begin, end, level + 1);
             node.first_child = uint32_t(group_.nodes.size());
             node.child_count = uint8_t(ranges.size());
             group_.nodes.resize(group_.nodes.size() + ranges.size());
@@ -108,7 +110,6 @@ private:
                 }
                 node.area += child.area;
                 node.max_triangle_area = std::max(node.max_triangle_area, child.max_triangle_area);
-                node.max_patch_area = std::max(node.max_patch_area, child.max_patch_area);
             }
         }
         if (!bounds.isEmpty()) node.bounds = enclosingFloatBox(bounds);
@@ -163,7 +164,8 @@ void buildGroup(Scene& scene, Group& group, const std::string& where) {
     std::vector<CellKey> keys(n);
     for (size_t i = 0; i < n; ++i) {
         // The level whose cells are about as large as the instance.
-        const double level = std::floor(std::log2(side / std::max(double(diameters[i]), side * 1e-9)));
+        const double level =
+            std::floor(std::log2(side / std::max(double(diameters[i]), side * 1e-9)));
         keys[i].level = uint32_t(std::clamp(level, 0.0, double(kMortonLevels)));
         const int dropped = 3 * (kMortonLevels - int(keys[i].level));
         const uint64_t code = mortonCode(centers[i], center_box.min, side);
@@ -171,8 +173,9 @@ void buildGroup(Scene& scene, Group& group, const std::string& where) {
     }
     std::vector<uint32_t> order(n);
     std::iota(order.begin(), order.end(), 0u);
-    std::sort(order.begin(), order.end(),
-              [&](uint32_t a, uint32_t b) { return keys[a] < keys[b] || (!(keys[b] < keys[a]) && a < b); });
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        return keys[a] < keys[b] || (!(keys[b] < keys[a]) && a < b);
+    });
     std::vector<CellKey> sorted(n);
     for (size_t i = 0; i < n; ++i) sorted[i] = keys[order[i]];
     keys = {}, centers = {}, diameters = {};
@@ -183,11 +186,11 @@ void buildGroup(Scene& scene, Group& group, const std::string& where) {
     group.nodes.shrink_to_fit();
     group.area = group.nodes[0].area;
     group.max_triangle_area = group.nodes[0].max_triangle_area;
-    group.max_patch_area = group.nodes[0].max_patch_area;
 }
 
 size_t Group::bytes() const {
-    return instances.bytes() + listed_index.capacity() * sizeof(uint32_t) + nodes.capacity() * sizeof(GroupNode);
+    return instances.bytes() + listed_index.capacity() * sizeof(uint32_t) +
+           nodes.capacity() * sizeof(GroupNode);
 }
 
 }  // namespace stipple

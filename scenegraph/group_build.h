@@ -6,8 +6,8 @@
 
 namespace stipple {
 
-// Builds nodes and sums of `group`; its children must be built. where: names the group in errors. Throws kInvalidScene for a
-// singular or non-finite transform. O(n log n).
+// Builds nodes and sums of `group`; its children must be built. where: names the group in errors.
+// Throws kInvalidScene for a singular or non-finite transform. O(n log n).
 void buildGroup(Scene& scene, Group& group, const std::string& where);
 
 }  // namespace stipple

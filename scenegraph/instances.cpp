@@ -27,7 +27,8 @@ bool decomposeSimilarity(const DMat3& m, double& scale, glm::dquat& rotation) {
 }  // namespace
 
 InstanceStore::InstanceStore(const DBox3& domain)
-    : origin_(domain.center()), step_(glm::max(domain.extent() * 0.5, DVec3(1e-6)) / kPositionSteps) {}
+    : origin_(domain.center()),
+      step_(glm::max(domain.extent() * 0.5, DVec3(1e-6)) / kPositionSteps) {}
 
 void InstanceStore::add(ChildRef child, const Affine& group_from_child) {
     double scale;

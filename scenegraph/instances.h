@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Compact storage of a group's instances: 32 bytes each for rotation, uniform scale and translation; any other affine map
-// costs 100 bytes more.
+// Compact storage of a group's instances: 32 bytes each for rotation, uniform scale and
+// translation; any other affine map costs 100 bytes more.
 #pragma once
 
 #include <core/math.h>
@@ -23,8 +23,8 @@ struct ChildRef {
 
 class InstanceStore {
 public:
-    // domain: a box of group space that holds the instances' translations; positions are kept to 2^-32 of its size. Translations
-    // outside it are kept exactly, at the higher price.
+    // domain: a box of group space that holds the instances' translations; positions are kept to
+    // 2^-32 of its size. Translations outside it are kept exactly, at the higher price.
     explicit InstanceStore(const DBox3& domain = DBox3{DVec3(-1), DVec3(1)});
 
     void add(ChildRef child, const Affine& group_from_child);
@@ -36,14 +36,16 @@ public:
     double areaScale(size_t i) const;
     // Reorders: new record i is old record order[i].
     void permute(const std::vector<uint32_t>& order);
-    size_t bytes() const { return records_.capacity() * sizeof(Record) + general_.capacity() * sizeof(Affine); }
+    size_t bytes() const {
+        return records_.capacity() * sizeof(Record) + general_.capacity() * sizeof(Affine);
+    }
 
 private:
     // scale 0 marks an index into general_ (in position[0]).
     struct Record {
-        int32_t position[3];   // translation = origin_ + step_ * position
-        float rotation[3];     // x, y, z of a unit quaternion with w >= 0
-        float scale;           // uniform, negative: mirrored (all axes)
+        int32_t position[3];  // translation = origin_ + step_ * position
+        float rotation[3];    // x, y, z of a unit quaternion with w >= 0
+        float scale;          // uniform, negative: mirrored (all axes)
         ChildRef child;
     };
     static_assert(sizeof(Record) == 32);

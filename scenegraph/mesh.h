@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Triangle meshes ("assets") and the octree of triangles over each: bounds, cumulated areas (the static distribution list) and
-// what the sampler must know of a node.
-// Based on: Wand, Fischer, Peter, Meyer auf der Heide, Strasser. The Randomized z-Buffer Algorithm. 2001 ("Precomputation: Distribution
-// List", "Spatial classification", "Improvements: handling of large triangles").
+// Triangle meshes ("assets") and the octree of triangles over each: bounds, cumulated areas (the
+// static distribution list) and what the sampler must know of a node. Based on: Wand, Fischer,
+// Peter, Meyer auf der Heide, Strasser. The Randomized z-Buffer Algorithm. 2001 ("Precomputation:
+// Distribution List", "Spatial classification", "Improvements: handling of large triangles").
 #pragma once
 
 #include <core/math.h>
@@ -13,57 +13,61 @@
 
 namespace stipple {
 
-// Triangles that share an area class (a factor of 4), a patch size class and the sidedness. A connected patch is what shares vertices:
-// a leaf, or a whole terrain. At most kMaxStrata a mesh.
+// Triangles that share an area class (a factor of 4), a patch width class and the sidedness. A
+// connected patch is what shares vertices: a leaf, a twig, or a whole terrain; its width is that of
+// the strip or tube it resembles. At most kMaxStrata a mesh.
 struct Stratum {
     float max_triangle_area = 0.0f;  // object space, m^2
-    float patch_area = 0.0f;         // object space, m^2: the mean, weighted by area
+    float patch_width = 0.0f;        // object space, m: the mean, weighted by area
     bool double_sided = false;
-    bool masked = false;             // has an alpha mask or is blended: the surface may be missing at a point
+    bool masked = false;  // has an alpha mask or is blended: the surface may be missing at a point
 };
 inline constexpr int kMaxStrata = 15;
 
-// Node of the octree over a mesh's triangles. Node 0 is the root over everything; its children are the roots of the strata (when
-// there are several), so every node but the root is homogeneous in area class, patch size and sidedness.
+// Node of the octree over a mesh's triangles. Node 0 is the root over everything; its children are
+// the roots of the strata (when there are several), so every node but the root is homogeneous in
+// area class, patch size and sidedness.
 struct MeshNode {
-    Box3 bounds;                  // object space
-    double area = 0.0;            // of its triangles, m^2
+    Box3 bounds;        // object space
+    double area = 0.0;  // of its triangles, m^2
     float max_triangle_area = 0.0f;
-    uint32_t first_triangle = 0;  // its triangles are [first_triangle, first_triangle + triangle_count)
+    uint32_t first_triangle =
+        0;  // its triangles are [first_triangle, first_triangle + triangle_count)
     uint32_t triangle_count = 0;
-    uint32_t first_child = 0;     // children are contiguous
-    uint8_t child_count = 0;      // 0: a leaf
-    uint8_t stratum = 0;          // index into Mesh::strata; kMixedStratum: several (root only)
+    uint32_t first_child = 0;  // children are contiguous
+    uint8_t child_count = 0;   // 0: a leaf
+    uint8_t stratum = 0;       // index into Mesh::strata; kMixedStratum: several (root only)
 };
 inline constexpr uint8_t kMixedStratum = 255;
 
 struct Mesh {
     std::string name;
 
-    // What loaders and generators fill. Per-vertex arrays are either empty or as long as `positions`.
-    std::vector<Vec3> positions;           // object space, metres
-    std::vector<Vec3> normals;             // unit; empty: flat shading
-    std::vector<Vec2> uvs;                 // glTF convention
-    std::vector<Vec4> colors;              // linear RGBA, multiplied with the material's colour; empty: white
-    std::vector<UVec3> triangles;          // counter-clockwise seen from the front
+    // What loaders and generators fill. Per-vertex arrays are either empty or as long as
+    // `positions`.
+    std::vector<Vec3> positions;  // object space, metres
+    std::vector<Vec3> normals;    // unit; empty: flat shading
+    std::vector<Vec2> uvs;        // glTF convention
+    std::vector<Vec4> colors;  // linear RGBA, multiplied with the material's colour; empty: white
+    std::vector<UVec3> triangles;             // counter-clockwise seen from the front
     std::vector<uint16_t> triangle_material;  // index into Scene::materials, one a triangle
 
     // What buildMesh() adds; it also sorts the triangles (strata, then Morton order).
     std::vector<MeshNode> nodes;
-    std::vector<double> cumulative_area;      // triangles.size() + 1 entries: the distribution list
-    std::vector<uint8_t> triangle_stratum;    // index into strata, one a triangle
+    std::vector<double> cumulative_area;    // triangles.size() + 1 entries: the distribution list
+    std::vector<uint8_t> triangle_stratum;  // index into strata, one a triangle
     std::vector<Stratum> strata;
     Box3 bounds;
     double area = 0.0;
-    float max_patch_area = 0.0f;
 
     size_t bytes() const;
 };
 
 struct Material;
 
-// Checks the arrays (indices in range, finite positions, materials in range), drops zero-area triangles, sorts the rest, builds
-// octree and lists. where: names the asset in errors. Throws kInvalidScene. O(n log n).
+// Checks the arrays (indices in range, finite positions, materials in range), drops zero-area
+// triangles, sorts the rest, builds octree and lists. where: names the asset in errors. Throws
+// kInvalidScene. O(n log n).
 void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::string& where);
 
 }  // namespace stipple

@@ -23,8 +23,10 @@ Error sceneError(const std::string& where, const std::string& message) {
 
 void checkArrays(const Mesh& mesh, size_t n_materials, const std::string& where) {
     const size_t n = mesh.positions.size();
-    if ((!mesh.normals.empty() && mesh.normals.size() != n) || (!mesh.uvs.empty() && mesh.uvs.size() != n) ||
-        (!mesh.colors.empty() && mesh.colors.size() != n) || mesh.triangle_material.size() != mesh.triangles.size()) {
+    if ((!mesh.normals.empty() && mesh.normals.size() != n) ||
+        (!mesh.uvs.empty() && mesh.uvs.size() != n) ||
+        (!mesh.colors.empty() && mesh.colors.size() != n) ||
+        mesh.triangle_material.size() != mesh.triangles.size()) {
         throw sceneError(where, "vertex arrays differ in length");
     }
     for (size_t i = 0; i < n; ++i) {
@@ -36,13 +38,14 @@ void checkArrays(const Mesh& mesh, size_t n_materials, const std::string& where)
         const UVec3& v = mesh.triangles[t];
         const uint32_t largest = std::max({v.x, v.y, v.z});
         if (largest >= n) {
-            throw sceneError(where, "triangle " + std::to_string(t) + ": index " + std::to_string(largest) +
-                                        " >= vertex count " + std::to_string(n));
+            throw sceneError(where, "triangle " + std::to_string(t) + ": index " +
+                                        std::to_string(largest) + " >= vertex count " +
+                                        std::to_string(n));
         }
         if (mesh.triangle_material[t] >= n_materials) {
             throw sceneError(where, "triangle " + std::to_string(t) + ": material " +
-                                        std::to_string(mesh.triangle_material[t]) + " >= material count " +
-                                        std::to_string(n_materials));
+                                        std::to_string(mesh.triangle_material[t]) +
+                                        " >= material count " + std::to_string(n_materials));
         }
     }
 }
@@ -62,9 +65,9 @@ struct DisjointSets {
     void join(uint32_t a, uint32_t b) { parent[find(a)] = find(b); }
 };
 
-// Area of the connected patch that each triangle belongs to. Vertices at the same position count as one: uv seams
-// and flat shading duplicate them.
-std::vector<double> patchAreas(const Mesh& mesh, const std::vector<double>& areas) {
+// Vertices at the same position count as one: uv seams and flat shading duplicate them. Returns the
+// vertex that stands for each.
+std::vector<uint32_t> joinVertices(const Mesh& mesh) {
     const size_t n = mesh.positions.size();
     std::vector<uint32_t> order(n), same(n);
     std::iota(order.begin(), order.end(), 0u);
@@ -74,16 +77,57 @@ std::vector<double> patchAreas(const Mesh& mesh, const std::vector<double>& area
     };
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
     for (size_t i = 0; i < n; ++i) {
-        same[order[i]] = i > 0 && key(order[i]) == key(order[i - 1]) ? same[order[i - 1]] : order[i];
+        same[order[i]] =
+            i > 0 && key(order[i]) == key(order[i - 1]) ? same[order[i - 1]] : order[i];
     }
-    DisjointSets sets(n);
+    return same;
+}
+
+// What is measured of a connected patch.
+struct Patch {
+    double area = 0.0;
+    double boundary = 0.0;  // length of the edges that only one triangle has
+    Box3 bounds;
+
+    // Width of the flat strip with that area and boundary; of a tube with that area and length
+    // where there is hardly a boundary.
+    double width() const {
+        const double length = glm::length(DVec3(bounds.extent()));
+        const double strip = boundary > 0.0 ? 4.0 * area / boundary : 1e300;
+        return strip < length ? strip : area / (kPi * std::max(length, 1e-30));
+    }
+};
+
+// Width of the connected patch that each triangle belongs to.
+std::vector<double> patchWidths(const Mesh& mesh, const std::vector<double>& areas) {
+    const std::vector<uint32_t> same = joinVertices(mesh);
+    DisjointSets sets(mesh.positions.size());
+    std::vector<std::pair<uint32_t, uint32_t>> edges;
+    edges.reserve(mesh.triangles.size() * 3);
     for (const UVec3& t : mesh.triangles) {
         sets.join(same[t.x], same[t.y]);
         sets.join(same[t.x], same[t.z]);
+        for (int k = 0; k < 3; ++k) edges.push_back(std::minmax(same[t[k]], same[t[(k + 1) % 3]]));
     }
-    std::vector<double> sum(n, 0.0), result(mesh.triangles.size());
-    for (size_t t = 0; t < areas.size(); ++t) sum[sets.find(same[mesh.triangles[t].x])] += areas[t];
-    for (size_t t = 0; t < areas.size(); ++t) result[t] = sum[sets.find(same[mesh.triangles[t].x])];
+    std::vector<Patch> patches(mesh.positions.size());
+    for (size_t t = 0; t < areas.size(); ++t) {
+        Patch& patch = patches[sets.find(same[mesh.triangles[t].x])];
+        patch.area += areas[t];
+        for (int k = 0; k < 3; ++k) patch.bounds.extend(mesh.positions[mesh.triangles[t][k]]);
+    }
+    std::sort(edges.begin(), edges.end());
+    for (size_t i = 0; i < edges.size();) {
+        size_t end = i + 1;
+        while (end < edges.size() && edges[end] == edges[i]) ++end;
+        if (end == i + 1) {
+            patches[sets.find(edges[i].first)].boundary += glm::distance(
+                DVec3(mesh.positions[edges[i].first]), DVec3(mesh.positions[edges[i].second]));
+        }
+        i = end;
+    }
+    std::vector<double> result(mesh.triangles.size());
+    for (size_t t = 0; t < areas.size(); ++t)
+        result[t] = patches[sets.find(same[mesh.triangles[t].x])].width();
     return result;
 }
 
@@ -100,7 +144,8 @@ struct StratumKey {
 };
 
 // Numbers the strata: one a key, the sparsest merged into a neighbour until they are few.
-std::map<StratumKey, uint8_t> chooseStrata(const std::map<StratumKey, uint32_t>& histogram, size_t n_triangles) {
+std::map<StratumKey, uint8_t> chooseStrata(const std::map<StratumKey, uint32_t>& histogram,
+                                           size_t n_triangles) {
     struct Entry {
         uint32_t count;
         std::vector<StratumKey> keys;
@@ -108,7 +153,8 @@ std::map<StratumKey, uint8_t> chooseStrata(const std::map<StratumKey, uint32_t>&
     std::vector<Entry> entries;
     for (const auto& [key, count] : histogram) entries.push_back({count, {key}});
     const auto mergeable = [](const Entry& a, const Entry& b) {
-        return a.keys[0].double_sided == b.keys[0].double_sided && a.keys[0].masked == b.keys[0].masked;
+        return a.keys[0].double_sided == b.keys[0].double_sided &&
+               a.keys[0].masked == b.keys[0].masked;
     };
     while (entries.size() > 1) {
         size_t best = entries.size();
@@ -171,8 +217,8 @@ private:
         return first;
     }
 
-    void finishInner(uint32_t index, uint32_t first_child, uint8_t count, uint32_t begin, uint32_t end,
-                     uint8_t stratum) {
+    void finishInner(uint32_t index, uint32_t first_child, uint8_t count, uint32_t begin,
+                     uint32_t end, uint8_t stratum) {
         MeshNode node;
         node.first_triangle = begin;
         node.triangle_count = end - begin;
@@ -181,13 +227,15 @@ private:
         node.stratum = stratum;
         for (uint32_t c = first_child; c < first_child + count; ++c) {
             node.bounds.extend(mesh_.nodes[c].bounds);
-            node.max_triangle_area = std::max(node.max_triangle_area, mesh_.nodes[c].max_triangle_area);
+            node.max_triangle_area =
+                std::max(node.max_triangle_area, mesh_.nodes[c].max_triangle_area);
         }
         node.area = mesh_.cumulative_area[end] - mesh_.cumulative_area[begin];
         mesh_.nodes[index] = node;
     }
 
-    // Makes nodes[index] the node over sorted triangles [begin, end), whose codes agree above `level`.
+    // Makes nodes[index] the node over sorted triangles [begin, end), whose codes agree above
+    // `level`.
     void fill(uint32_t index, uint32_t begin, uint32_t end, int level, uint8_t stratum) {
         if (end - begin <= kLeafTriangles || level == kMortonLevels) {
             MeshNode node;
@@ -197,8 +245,9 @@ private:
             for (uint32_t t = begin; t < end; ++t) {
                 const UVec3& v = mesh_.triangles[t];
                 for (int k = 0; k < 3; ++k) node.bounds.extend(mesh_.positions[v[k]]);
-                node.max_triangle_area = std::max(
-                    node.max_triangle_area, float(mesh_.cumulative_area[t + 1] - mesh_.cumulative_area[t]));
+                node.max_triangle_area =
+                    std::max(node.max_triangle_area,
+                             float(mesh_.cumulative_area[t + 1] - mesh_.cumulative_area[t]));
             }
             node.area = mesh_.cumulative_area[end] - mesh_.cumulative_area[begin];
             mesh_.nodes[index] = node;
@@ -236,7 +285,8 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
     for (size_t t = 0; t < mesh.triangles.size(); ++t) {
         const double area = triangleArea(mesh, mesh.triangles[t]);
         if (!(area > 0.0)) continue;
-        if (!std::isfinite(area)) throw sceneError(where, "triangle " + std::to_string(t) + " has no finite area");
+        if (!std::isfinite(area))
+            throw sceneError(where, "triangle " + std::to_string(t) + " has no finite area");
         mesh.triangles[kept] = mesh.triangles[t];
         mesh.triangle_material[kept++] = mesh.triangle_material[t];
         areas.push_back(area);
@@ -244,12 +294,13 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
     mesh.triangles.resize(kept);
     mesh.triangle_material.resize(kept);
 
-    const std::vector<double> patches = patchAreas(mesh, areas);
+    const std::vector<double> patches = patchWidths(mesh, areas);
     std::vector<StratumKey> keys(kept);
     std::map<StratumKey, uint32_t> histogram;
     for (size_t t = 0; t < kept; ++t) {
         const Material& m = materials[mesh.triangle_material[t]];
-        keys[t] = {m.double_sided, m.alpha_mode != AlphaMode::kOpaque, areaClass(patches[t]), areaClass(areas[t])};
+        keys[t] = {m.double_sided, m.alpha_mode != AlphaMode::kOpaque,
+                   areaClass(patches[t] * patches[t]), areaClass(areas[t])};
         ++histogram[keys[t]];
     }
     const std::map<StratumKey, uint8_t> strata = chooseStrata(histogram, kept);
@@ -265,7 +316,9 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
     std::vector<uint8_t> stratum(kept);
     for (size_t t = 0; t < kept; ++t) {
         const UVec3& v = mesh.triangles[t];
-        const DVec3 centroid = (DVec3(mesh.positions[v.x]) + DVec3(mesh.positions[v.y]) + DVec3(mesh.positions[v.z])) / 3.0;
+        const DVec3 centroid =
+            (DVec3(mesh.positions[v.x]) + DVec3(mesh.positions[v.y]) + DVec3(mesh.positions[v.z])) /
+            3.0;
         codes[t] = mortonCode(centroid, DVec3(mesh.bounds.min), side);
         stratum[t] = strata.at(keys[t]);
     }
@@ -287,10 +340,10 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
     const std::vector<double> sorted_patches = permuted(patches);
     const std::vector<StratumKey> sorted_keys = permuted(keys);
 
-    mesh.max_patch_area = 0.0f;
     mesh.cumulative_area.assign(kept + 1, 0.0);
     mesh.strata.assign(kept ? mesh.triangle_stratum.back() + 1u : 1u, {});
-    std::vector<double> stratum_area(mesh.strata.size(), 0.0), stratum_patch(mesh.strata.size(), 0.0);
+    std::vector<double> stratum_area(mesh.strata.size(), 0.0),
+        stratum_patch(mesh.strata.size(), 0.0);
     for (size_t t = 0; t < kept; ++t) {
         mesh.cumulative_area[t + 1] = mesh.cumulative_area[t] + areas[t];
         const uint8_t s = mesh.triangle_stratum[t];
@@ -302,16 +355,17 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
         stratum_patch[s] += areas[t] * sorted_patches[t];
     }
     for (size_t s = 0; s < mesh.strata.size(); ++s) {
-        if (stratum_area[s] > 0.0) mesh.strata[s].patch_area = float(stratum_patch[s] / stratum_area[s]);
-        mesh.max_patch_area = std::max(mesh.max_patch_area, mesh.strata[s].patch_area);
+        if (stratum_area[s] > 0.0)
+            mesh.strata[s].patch_width = float(stratum_patch[s] / stratum_area[s]);
     }
     mesh.area = mesh.cumulative_area.back();
     OctreeBuilder(mesh, codes).build();
 }
 
 size_t Mesh::bytes() const {
-    return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) + uvs.size() * sizeof(Vec2) +
-           colors.size() * sizeof(Vec4) + triangles.size() * (sizeof(UVec3) + sizeof(uint16_t) + sizeof(uint8_t)) +
+    return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) +
+           uvs.size() * sizeof(Vec2) + colors.size() * sizeof(Vec4) +
+           triangles.size() * (sizeof(UVec3) + sizeof(uint16_t) + sizeof(uint8_t)) +
            nodes.size() * sizeof(MeshNode) + cumulative_area.size() * sizeof(double);
 }
 

@@ -47,7 +47,8 @@ std::vector<uint32_t> childrenFirst(const Scene& scene) {
             const uint32_t child = children[g][next[g]++];
             if (state[child] == State::kOpen) {
                 std::string cycle;
-                for (size_t i = std::find(path.begin(), path.end(), child) - path.begin(); i < path.size(); ++i) {
+                for (size_t i = std::find(path.begin(), path.end(), child) - path.begin();
+                     i < path.size(); ++i) {
                     cycle += scene.groups[path[i]].name + " > ";
                 }
                 throw Error(ErrorCode::kInvalidScene, scene.path,

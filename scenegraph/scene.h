@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The scene: assets, groups of instances nested to any depth (a directed acyclic graph, never expanded), cameras and lights.
+// The scene: assets, groups of instances nested to any depth (a directed acyclic graph, never
+// expanded), cameras and lights.
 #pragma once
 
 #include <core/camera.h>
@@ -25,22 +26,24 @@ struct Scene {
     uint32_t root = 0;  // index into groups
     std::vector<Camera> cameras;
     Lighting lighting;
-    std::map<std::string, std::string> render_defaults;  // the scene file's "render": settings by name
+    std::map<std::string, std::string>
+        render_defaults;  // the scene file's "render": settings by name
 
     const Camera* findCamera(const std::string& name) const;
 };
 
-// Builds every mesh's and group's octree and sums, children before parents. Throws kInvalidScene for a group that contains itself
-// (naming the cycle), singular or non-finite transforms, indices out of range.
+// Builds every mesh's and group's octree and sums, children before parents. Throws kInvalidScene
+// for a group that contains itself (naming the cycle), singular or non-finite transforms, indices
+// out of range.
 void buildScene(Scene& scene, ThreadPool& pool);
 
 struct SceneSize {
-    double instances = 0;          // mesh instances, expanded
-    double stored_instances = 0;   // records in groups
+    double instances = 0;         // mesh instances, expanded
+    double stored_instances = 0;  // records in groups
     double triangles_unique = 0;
-    double triangles_total = 0;    // expanded
-    size_t bytes = 0;              // memory of the scene graph: meshes, textures, groups, octrees
-    size_t instance_bytes = 0;     // of that: groups and their octrees
+    double triangles_total = 0;  // expanded
+    size_t bytes = 0;            // memory of the scene graph: meshes, textures, groups, octrees
+    size_t instance_bytes = 0;   // of that: groups and their octrees
 };
 SceneSize sceneSize(const Scene& scene);
 

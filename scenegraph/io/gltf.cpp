@@ -18,7 +18,7 @@ struct Placement {
     Affine group_from_child;
 };
 
-constexpr size_t kMaxVisits = 10000000;
+constexpr size_t kMaxRepeatedNodes = 1000000;
 
 // Walks the default scene, without recursion: a file may nest a million nodes.
 class NodeWalk {
@@ -112,7 +112,9 @@ std::vector<Placement> NodeWalk::run() {
         const tinygltf::Node& node = document_.model.nodes[step.node];
         const std::string path = "nodes[" + std::to_string(step.node) + "]";
         // glTF forbids nodes of several parents, files have them all the same; a few can stand for any number of nodes.
-        if (++n_visits > kMaxVisits) document_.fail(ErrorCode::kUnsupported, path, "the scene has more than 10^7 nodes");
+        if (++n_visits > is_open.size() + kMaxRepeatedNodes) {
+            document_.fail(ErrorCode::kUnsupported, path, "nodes of several parents make more than 10^6 nodes");
+        }
         if (n_visits % 4096 == 0) document_.context.throwIfCancelled();
         const Affine world_from_node = step.world_from_parent * nodeTransform(document_, node, path);
         if (!isFinite(world_from_node)) document_.fail(ErrorCode::kInvalidScene, path, "its transform is not finite");

@@ -33,10 +33,12 @@ void addMaterial(tinygltf::Model& model, const Material& material) {
     tinygltf::Material& target = model.materials.emplace_back();
     target.name = material.name;
     const Vec3& color = material.base_color;
-    target.pbrMetallicRoughness.baseColorFactor = Numbers{color.x, color.y, color.z, material.alpha};
+    target.pbrMetallicRoughness.baseColorFactor =
+        Numbers{color.x, color.y, color.z, material.alpha};
     target.pbrMetallicRoughness.metallicFactor = 0.0;
     // Blinn-Phong's exponent n as microfacet roughness: n = 2 / roughness^4 - 2.
-    target.pbrMetallicRoughness.roughnessFactor = std::pow(2.0 / (2.0 + std::max(0.0f, material.shininess)), 0.25);
+    target.pbrMetallicRoughness.roughnessFactor =
+        std::pow(2.0 / (2.0 + std::max(0.0f, material.shininess)), 0.25);
     target.doubleSided = material.double_sided;
     if (material.alpha_mode == AlphaMode::kMask) target.alphaMode = "MASK";
     if (material.alpha_mode == AlphaMode::kBlend) target.alphaMode = "BLEND";
@@ -56,8 +58,8 @@ void addMaterial(tinygltf::Model& model, const Material& material) {
 
 // Appends the array to the file's one buffer and returns the index of an accessor for it.
 template <class T>
-int addAccessor(tinygltf::Model& model, const std::vector<T>& values, int type, int component_type, size_t count,
-                int target) {
+int addAccessor(tinygltf::Model& model, const std::vector<T>& values, int type, int component_type,
+                size_t count, int target) {
     tinygltf::BufferView view;
     view.buffer = 0;
     view.byteOffset = model.buffers[0].data.size();
@@ -78,7 +80,8 @@ int addAccessor(tinygltf::Model& model, const std::vector<T>& values, int type, 
 
 template <class T>
 int addVertexData(tinygltf::Model& model, const std::vector<T>& values, int type) {
-    return addAccessor(model, values, type, TINYGLTF_COMPONENT_TYPE_FLOAT, values.size(), TINYGLTF_TARGET_ARRAY_BUFFER);
+    return addAccessor(model, values, type, TINYGLTF_COMPONENT_TYPE_FLOAT, values.size(),
+                       TINYGLTF_TARGET_ARRAY_BUFFER);
 }
 
 std::map<std::string, int> addVertices(tinygltf::Model& model, const Mesh& mesh) {
@@ -89,23 +92,29 @@ std::map<std::string, int> addVertices(tinygltf::Model& model, const Mesh& mesh)
     tinygltf::Accessor& positions = model.accessors.back();
     positions.minValues = Numbers{bounds.min.x, bounds.min.y, bounds.min.z};
     positions.maxValues = Numbers{bounds.max.x, bounds.max.y, bounds.max.z};
-    if (!mesh.normals.empty()) attributes["NORMAL"] = addVertexData(model, mesh.normals, TINYGLTF_TYPE_VEC3);
-    if (!mesh.uvs.empty()) attributes["TEXCOORD_0"] = addVertexData(model, mesh.uvs, TINYGLTF_TYPE_VEC2);
-    if (!mesh.colors.empty()) attributes["COLOR_0"] = addVertexData(model, mesh.colors, TINYGLTF_TYPE_VEC4);
+    if (!mesh.normals.empty())
+        attributes["NORMAL"] = addVertexData(model, mesh.normals, TINYGLTF_TYPE_VEC3);
+    if (!mesh.uvs.empty())
+        attributes["TEXCOORD_0"] = addVertexData(model, mesh.uvs, TINYGLTF_TYPE_VEC2);
+    if (!mesh.colors.empty())
+        attributes["COLOR_0"] = addVertexData(model, mesh.colors, TINYGLTF_TYPE_VEC4);
     return attributes;
 }
 
 size_t fileBytes(const Mesh& mesh) {
-    return mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2) +
-           mesh.colors.size() * sizeof(Vec4) + mesh.triangles.size() * sizeof(UVec3);
+    return mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) +
+           mesh.uvs.size() * sizeof(Vec2) + mesh.colors.size() * sizeof(Vec4) +
+           mesh.triangles.size() * sizeof(UVec3);
 }
 
 }  // namespace
 
 void saveGlb(const std::string& path, const Mesh& mesh, const std::vector<Material>& materials) {
     constexpr size_t kMostBytes = 0xff000000u;  // the format counts bytes in 32 bits
-    if (mesh.triangles.empty()) throw Error(ErrorCode::kInvalidArgument, path, "the mesh has no triangles");
-    if (fileBytes(mesh) > kMostBytes) throw Error(ErrorCode::kInvalidArgument, path, "the mesh is too large for a .glb");
+    if (mesh.triangles.empty())
+        throw Error(ErrorCode::kInvalidArgument, path, "the mesh has no triangles");
+    if (fileBytes(mesh) > kMostBytes)
+        throw Error(ErrorCode::kInvalidArgument, path, "the mesh is too large for a .glb");
 
     tinygltf::Model model;
     model.asset.version = "2.0";
@@ -125,8 +134,9 @@ void saveGlb(const std::string& path, const Mesh& mesh, const std::vector<Materi
         primitive.attributes = attributes;
         primitive.material = material;
         primitive.mode = TINYGLTF_MODE_TRIANGLES;
-        primitive.indices = addAccessor(model, triangles, TINYGLTF_TYPE_SCALAR, TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
-                                        triangles.size() * 3, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
+        primitive.indices = addAccessor(model, triangles, TINYGLTF_TYPE_SCALAR,
+                                        TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, triangles.size() * 3,
+                                        TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
     }
     tinygltf::Node& node = model.nodes.emplace_back();
     node.name = mesh.name;

@@ -24,7 +24,8 @@ void View::ray(float sub_x, float sub_y, Vec3& origin, Vec3& direction) const {
 }
 
 View makeView(const Camera& camera, int width, int height, int subpixels) {
-    if (width < 1 || height < 1 || width > 65536 || height > 65536 || int64_t(width) * height > (int64_t(1) << 28)) {
+    if (width < 1 || height < 1 || width > 65536 || height > 65536 ||
+        int64_t(width) * height > (int64_t(1) << 28)) {
         throw Error(ErrorCode::kInvalidArgument, "",
                     "picture size " + std::to_string(width) + "x" + std::to_string(height) +
                         " is out of range (1..65536 a side, at most 2^28 pixels)");

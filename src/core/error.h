@@ -11,8 +11,8 @@ namespace stipple {
 enum class ErrorCode {
     kInvalidArgument,  // a setting or an option is out of range or contradicts another
     kFileNotFound,
-    kParse,        // the file is not what its format says
-    kInvalidScene, // well-formed, but makes no sense: cycles, unknown names, singular transforms
+    kParse,         // the file is not what its format says
+    kInvalidScene,  // well-formed, but makes no sense: cycles, unknown names, singular transforms
     kUnsupported,
     kOutOfMemory,  // would exceed the memory limit
     kIo,           // writing failed
@@ -25,7 +25,9 @@ enum class ErrorCode {
 class Error : public std::runtime_error {
 public:
     Error(ErrorCode code, const std::string& where, const std::string& message)
-        : std::runtime_error(where.empty() ? message : where + ": " + message), code_(code), where_(where) {}
+        : std::runtime_error(where.empty() ? message : where + ": " + message),
+          code_(code),
+          where_(where) {}
 
     ErrorCode code() const { return code_; }
     const std::string& where() const { return where_; }

@@ -21,11 +21,16 @@ struct Image {
 
     Image() = default;
     Image(int w, int h, std::vector<std::string> names)
-        : width(w), height(h), channels(std::move(names)), data(size_t(w) * h * channels.size(), 0.0f) {}
+        : width(w),
+          height(h),
+          channels(std::move(names)),
+          data(size_t(w) * h * channels.size(), 0.0f) {}
 
     int channelCount() const { return int(channels.size()); }
     float* pixel(int x, int y) { return data.data() + (size_t(y) * width + x) * channels.size(); }
-    const float* pixel(int x, int y) const { return data.data() + (size_t(y) * width + x) * channels.size(); }
+    const float* pixel(int x, int y) const {
+        return data.data() + (size_t(y) * width + x) * channels.size();
+    }
     // Index of the channel of that name, -1 if there is none.
     int channelIndex(const std::string& name) const;
 };
@@ -34,14 +39,16 @@ struct Image {
 float srgbFromLinear(float linear);
 float linearFromSrgb(float srgb);
 
-// Reads any format OpenImageIO knows. 8-bit RGB(A) pictures are taken as sRGB and made linear; float formats are
-// linear already. Throws kFileNotFound or kParse.
+// Reads any format OpenImageIO knows. 8-bit RGB(A) pictures are taken as sRGB and made linear;
+// float formats are linear already. Throws kFileNotFound or kParse.
 Image loadImage(const std::string& path);
 
-// Writes the picture whole or not at all (a temporary file in the same folder, renamed at the end). Format by
-// extension: .png is sRGB, 8 bits, first three (or four, if there is "A") channels; .exr holds every channel as float,
-// with `metadata` in its header. Throws kIo with the reason, kInvalidArgument for another extension.
-void saveImage(const Image& image, const std::string& path, const std::map<std::string, std::string>& metadata = {});
+// Writes the picture whole or not at all (a temporary file in the same folder, renamed at the end).
+// Format by extension: .png is sRGB, 8 bits, first three (or four, if there is "A") channels; .exr
+// holds every channel as float, with `metadata` in its header. Throws kIo with the reason,
+// kInvalidArgument for another extension.
+void saveImage(const Image& image, const std::string& path,
+               const std::map<std::string, std::string>& metadata = {});
 
 // Writes `contents` to `path` whole or not at all. Throws kIo.
 void saveFile(const std::string& path, const std::string& contents);

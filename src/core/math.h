@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors, boxes and affine maps that every layer shares. GLM underneath; column vectors, right-handed, metres.
-// Spaces are named in variables: p_world, n_object; a transform from object to world space is world_from_object.
+// Vectors, boxes and affine maps that every layer shares. GLM underneath; column vectors,
+// right-handed, metres. Spaces are named in variables: p_world, n_object; a transform from object
+// to world space is world_from_object.
 #pragma once
 
 #include <algorithm>
@@ -62,7 +63,8 @@ struct Affine {
 };
 
 inline Affine operator*(const Affine& c_from_b, const Affine& b_from_a) {
-    return {c_from_b.linear * b_from_a.linear, c_from_b.linear * b_from_a.translation + c_from_b.translation};
+    return {c_from_b.linear * b_from_a.linear,
+            c_from_b.linear * b_from_a.translation + c_from_b.translation};
 }
 
 inline Affine inverse(const Affine& b_from_a) {
@@ -74,7 +76,8 @@ inline bool isFinite(const DVec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 inline bool isFinite(const Affine& a) {
-    return isFinite(a.linear[0]) && isFinite(a.linear[1]) && isFinite(a.linear[2]) && isFinite(a.translation);
+    return isFinite(a.linear[0]) && isFinite(a.linear[1]) && isFinite(a.linear[2]) &&
+           isFinite(a.translation);
 }
 
 // Box of the transformed box's corners.
@@ -86,15 +89,17 @@ inline DBox3 transformBox(const Affine& b_from_a, const BoxT<V>& box) {
     return r;
 }
 
-// Cofactor matrix: maps area vectors (normal times area) as `m` maps points; also right for mirrored maps.
+// Cofactor matrix: maps area vectors (normal times area) as `m` maps points; also right for
+// mirrored maps.
 inline DMat3 cofactor(const DMat3& m) {
     return DMat3(glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1]));
 }
 
-// The largest factor by which `m` scales an area: the product of its two largest singular values. For a
-// similarity this is exact; otherwise an upper bound that is at most sqrt(3) too large.
+// The largest factor by which `m` scales an area: the product of its two largest singular values.
+// For a similarity this is exact; otherwise an upper bound that is at most sqrt(3) too large.
 double maxAreaScale(const DMat3& m);
-// The largest factor by which `m` scales a length (an upper bound of the largest singular value, at most sqrt(3) off).
+// The largest factor by which `m` scales a length (an upper bound of the largest singular value, at
+// most sqrt(3) off).
 double maxLengthScale(const DMat3& m);
 
 }  // namespace stipple

@@ -15,20 +15,23 @@ struct ThreadPool::Impl {
 };
 
 ThreadPool::ThreadPool(int n_threads)
-    : impl_(std::make_unique<Impl>(n_threads > 0 ? n_threads : std::max(1u, std::thread::hardware_concurrency()))) {}
+    : impl_(std::make_unique<Impl>(
+          n_threads > 0 ? n_threads : std::max(1u, std::thread::hardware_concurrency()))) {}
 ThreadPool::~ThreadPool() = default;
 
 int ThreadPool::threadCount() const { return impl_->n_threads; }
 
 void ThreadPool::forEach(size_t count, const std::function<void(size_t, int)>& body) {
-    // One task a thread and a shared counter: indices go out in ascending order and `thread` is exclusive to a task.
+    // One task a thread and a shared counter: indices go out in ascending order and `thread` is
+    // exclusive to a task.
     std::atomic<size_t> next{0};
     const size_t tasks = std::min(count, size_t(impl_->n_threads));
     impl_->arena.execute([&] {
         tbb::parallel_for(
             size_t(0), tasks,
             [&](size_t thread) {
-                for (size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;) body(i, int(thread));
+                for (size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;)
+                    body(i, int(thread));
             },
             tbb::simple_partitioner());
     });

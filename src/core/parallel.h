@@ -9,7 +9,8 @@
 
 namespace stipple {
 
-// Raised from a signal handler or another thread; long work looks at it and throws Error(kCancelled).
+// Raised from a signal handler or another thread; long work looks at it and throws
+// Error(kCancelled).
 struct CancelFlag {
     std::atomic<bool> requested{false};
 };
@@ -21,8 +22,9 @@ public:
     ~ThreadPool();
 
     int threadCount() const;
-    // Calls body(index, thread) for every index in [0, count), thread in [0, threadCount()), indices handed out in
-    // ascending order. The first exception is rethrown on the caller when all threads have stopped.
+    // Calls body(index, thread) for every index in [0, count), thread in [0, threadCount()),
+    // indices handed out in ascending order. The first exception is rethrown on the caller when all
+    // threads have stopped.
     void forEach(size_t count, const std::function<void(size_t index, int thread)>& body);
 
 private:

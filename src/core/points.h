@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What joins sampling and reconstruction: sources plan batches of points and emit them into sinks, tile by tile, as often as asked
-// and the same every time (replay). Reconstruction knows points, tiles and pixels only.
-// Based on: Levoy, Whitted. The Use of Points as a Display Primitive. 1985 (points as the meta-primitive).
+// What joins sampling and reconstruction: sources plan batches of points and emit them into sinks,
+// tile by tile, as often as asked and the same every time (replay). Reconstruction knows points,
+// tiles and pixels only. Based on: Levoy, Whitted. The Use of Points as a Display Primitive. 1985
+// (points as the meta-primitive).
 #pragma once
 
 #include <core/camera.h>
@@ -22,31 +23,37 @@ struct SubpixelRect {
     int width() const { return x1 - x0; }
     int height() const { return y1 - y0; }
     bool isEmpty() const { return x0 >= x1 || y0 >= y1; }
-    bool overlaps(const SubpixelRect& o) const { return x0 < o.x1 && o.x0 < x1 && y0 < o.y1 && o.y0 < y1; }
+    bool overlaps(const SubpixelRect& o) const {
+        return x0 < o.x1 && o.x0 < x1 && y0 < o.y1 && o.y0 < y1;
+    }
 };
 
-// Something to draw: a node of the scene graph, which emit() may open further. What the frame loop must know to bin, sort and skip it.
+// Something to draw: a node of the scene graph, which emit() may open further. What the frame loop
+// must know to bin, sort and skip it.
 struct Batch {
-    SubpixelRect rect;         // encloses the projection of all its points, clipped to the picture
-    float z_min = 0.0f;        // camera z of its points
+    SubpixelRect rect;   // encloses the projection of all its points, clipped to the picture
+    float z_min = 0.0f;  // camera z of its points
     float z_max = 0.0f;
-    float expected_points = 0; // about what emit() would draw if nothing hid it
-    uint32_t index = 0;        // the source's own number of it
+    float expected_points = 0;  // about what emit() would draw if nothing hid it
+    uint32_t index = 0;         // the source's own number of it
 };
 
 inline constexpr int kBlockPoints = 64;
 
-// Numbers are below 2^30 and carry the kind in their high bits, so that all kinds meet in one depth test.
+// Numbers are below 2^30 and carry the kind in their high bits, so that all kinds meet in one depth
+// test.
 inline constexpr uint32_t kZBufferBit = 0x80000000u;   // a triangle of the frame's z-buffer
 inline constexpr uint32_t kTriangleBit = 0x40000000u;  // a triangle emitted in the tile
 inline constexpr uint32_t kKindBits = kZBufferBit | kTriangleBit;
 
-// Up to 64 points in camera space, structure of arrays. Point i has the number first_number + i within its tile.
+// Up to 64 points in camera space, structure of arrays. Point i has the number first_number + i
+// within its tile.
 struct PointBlock {
     int count = 0;
     uint32_t first_number = 0;
-    const uint8_t* stratum = nullptr;    // index into `patch`, one a point
-    const float* patch = nullptr;        // diameter of the connected patch a point lies on, in subpixels
+    const uint8_t* stratum = nullptr;  // index into `patch`, one a point
+    const float* patch = nullptr;      // width of the connected patch a point lies on, in subpixels
+    int patch_count = 0;               // at most 16
     alignas(64) float x[kBlockPoints];
     alignas(64) float y[kBlockPoints];
     alignas(64) float z[kBlockPoints];
@@ -60,12 +67,13 @@ public:
     virtual bool isSurface(int triangle, float sub_x, float sub_y) const = 0;
 };
 
-// Up to 64 triangles in camera space, all with z > 0: too large for points, too small for the z-buffer of the large ones. Triangle i has
-// the number first_number + i within its tile (with kTriangleBit).
+// Up to 64 triangles in camera space, all with z > 0: too large for points, too small for the
+// z-buffer of the large ones. Triangle i has the number first_number + i within its tile (with
+// kTriangleBit).
 struct TriangleBlock {
     int count = 0;
     uint32_t first_number = 0;
-    const MaskTest* mask = nullptr;  // nullptr: all surface
+    const MaskTest* mask = nullptr;        // nullptr: all surface
     alignas(64) float x[3][kBlockPoints];  // of the three vertices
     alignas(64) float y[3][kBlockPoints];
     alignas(64) float z[3][kBlockPoints];
@@ -79,8 +87,8 @@ public:
     virtual ~PointSink() = default;
     virtual void take(const PointBlock& block) = 0;
     virtual void take(const TriangleBlock& block) = 0;
-    // True if nothing within the rectangle at or behind z_min can change the picture of this tile: sources ask before they
-    // open a node.
+    // True if nothing within the rectangle at or behind z_min can change the picture of this tile:
+    // sources ask before they open a node.
     virtual bool hides(const SubpixelRect& rect, float z_min) = 0;
     virtual const SubpixelRect& region() const = 0;  // subpixels the sink wants, tile and halo
 };
@@ -89,12 +97,13 @@ public:
 class TileEmitter {
 public:
     virtual ~TileEmitter() = default;
-    // Pushes what the batch has within the sink's region, near before far, leaving out what the sink hides. The same points every
-    // time, but for first_number.
+    // Pushes what the batch has within the sink's region, near before far, leaving out what the
+    // sink hides. The same points every time, but for first_number.
     virtual void emit(const Batch& batch, PointSink& sink) = 0;
-    // Normal, albedo, material and object of an emitted point or triangle, seen at sub_x, sub_y (subpixel coordinates) at
-    // sample.depth.
-    virtual void attributes(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample) const = 0;
+    // Normal, albedo, material and object of an emitted point or triangle, seen at sub_x, sub_y
+    // (subpixel coordinates) at sample.depth.
+    virtual void attributes(uint32_t number, float sub_x, float sub_y,
+                            SurfaceSample& sample) const = 0;
     virtual void forget() = 0;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counter-based random numbers: every number is a pure function of its key, so any thread may draw any point
-// in any order and a picture has the same bits for any number of threads.
+// Counter-based random numbers: every number is a pure function of its key, so any thread may draw
+// any point in any order and a picture has the same bits for any number of threads.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,8 @@
 namespace stipple {
 
 // Mixes 64 bits so that every input bit changes every output bit with probability 1/2.
-// This work is based on: Steele, Lea, Flood. Fast Splittable Pseudorandom Number Generators. 2014 (finalizer, variant 13).
+// This work is based on: Steele, Lea, Flood. Fast Splittable Pseudorandom Number Generators. 2014
+// (finalizer, variant 13).
 inline uint64_t mixBits(uint64_t v) {
     v ^= v >> 30;
     v *= 0xbf58476d1ce4e5b9ull;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The settings table: every member of RenderSettings has one entry here, and nothing else knows its name, range or text form.
+// The settings table: every member of RenderSettings has one entry here, and nothing else knows its
+// name, range or text form.
 #include <core/nearest_name.h>
 #include <core/settings.h>
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every knob of a picture, in one struct, and the one table from which command line, scene file and studies are made.
+// Every knob of a picture, in one struct, and the one table from which command line, scene file and
+// studies are made.
 #pragma once
 
 #include <core/error.h>
@@ -16,41 +17,45 @@ enum class Reconstruct { kPerPixel, kSplat, kGaussian };
 enum class Sampler { kStratified, kRandom };
 
 struct RenderSettings {
-    int width = 1280;               // pixels
-    int height = 720;               // pixels
+    int width = 1280;  // pixels
+    int height = 720;  // pixels
     Method method = Method::kPoints;
-    double samples = 1.0;           // K: expected kept points per subpixel of exactly projected area; raycast: rays a pixel
-    int subpixels = 4;              // along one side of a pixel
+    double samples = 1.0;  // K: expected kept points per subpixel of exactly projected area;
+                           // raycast: rays a pixel
+    int subpixels = 4;     // along one side of a pixel
     Sampler sampler = Sampler::kStratified;
     Reconstruct reconstruct = Reconstruct::kPerPixel;
-    double splat_size = 1.0;        // pixels, side of a square splat (splat), or 2 sigma (gaussian)
+    double splat_size = 1.0;  // pixels, side of a square splat (splat), or 2 sigma (gaussian)
     bool shadows = false;
     bool ao = false;
     uint64_t seed = 1;
-    int threads = 0;                // 0: one a core
-    int cache_mb = 256;             // point lists kept between frames; 0: off
-    double cut_ratio = 1.41;        // largest ratio of depths within a node of the cut
-    double area_threshold = 4.0;    // triangles larger than this many subpixels are not drawn as points
-    double large_triangle = 1024.0; // triangles larger than this many subpixels go to OSMesa, before the tiles
-    int list_length = 1024;         // most points taken from a node's list before the node is opened
-    int tile_size = 256;            // subpixels along a side of a screen tile (rounded to whole pixels)
-    bool culling = true;            // skip batches behind what a tile has already drawn
-    bool fill = true;               // per-pixel: occlusion removal and filling
+    int threads = 0;          // 0: one a core
+    int cache_mb = 256;       // point lists kept between frames; 0: off
+    double cut_ratio = 1.41;  // largest ratio of depths within a node of the cut
+    double area_threshold =
+        4.0;  // triangles larger than this many subpixels are not drawn as points
+    double large_triangle =
+        1024.0;  // triangles larger than this many subpixels go to OSMesa, before the tiles
+    int list_length = 1024;  // most points taken from a node's list before the node is opened
+    int tile_size = 256;     // subpixels along a side of a screen tile (rounded to whole pixels)
+    bool culling = true;     // skip batches behind what a tile has already drawn
+    bool fill = true;        // per-pixel: occlusion removal and filling
 };
 
 // One setting as command line, JSON and help see it.
 struct SettingInfo {
-    std::string key;      // snake_case, as in --set key=value and the scene file
-    std::string values;   // "1..65536", "on|off", "stratified|random"
-    std::string unit;     // "pixels", "" if none
-    std::string help;     // one sentence
+    std::string key;         // snake_case, as in --set key=value and the scene file
+    std::string values;      // "1..65536", "on|off", "stratified|random"
+    std::string unit;        // "pixels", "" if none
+    std::string help;        // one sentence
     bool has_option = true;  // has a command line option of its own; else only --set reaches it
 };
 const std::vector<SettingInfo>& settingsTable();
 
-// Sets one key from text. where: names the place in errors ("--set", "forest.scene.json: /render/samples").
-// Throws kInvalidArgument naming the nearest key or the allowed values.
-void applySetting(RenderSettings& settings, const std::string& key, const std::string& value, const std::string& where);
+// Sets one key from text. where: names the place in errors ("--set", "forest.scene.json:
+// /render/samples"). Throws kInvalidArgument naming the nearest key or the allowed values.
+void applySetting(RenderSettings& settings, const std::string& key, const std::string& value,
+                  const std::string& where);
 std::string settingValue(const RenderSettings& settings, const std::string& key);
 
 }  // namespace stipple

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What any method (points, rasterized triangles, rays) finds at a place in the picture, ready to be shaded.
+// What any method (points, rasterized triangles, rays) finds at a place in the picture, ready to be
+// shaded.
 #pragma once
 
 #include <core/math.h>
@@ -9,12 +10,13 @@
 namespace stipple {
 
 struct SurfaceSample {
-    float depth = kInfinity;        // camera z; infinite where there is nothing
-    Vec3 position_camera = Vec3(0); // relative to the eye
-    Vec3 normal_world = Vec3(0, 1, 0);  // unit, shading normal, on the side the asset's author gave it
-    Vec3 albedo = Vec3(0);          // linear base colour: material x texture x vertex colour
-    uint32_t material = 0;          // index into Scene::materials
-    uint32_t object = 0;            // hash of the instance path, 0 where there is nothing
+    float depth = kInfinity;         // camera z; infinite where there is nothing
+    Vec3 position_camera = Vec3(0);  // relative to the eye
+    Vec3 normal_world =
+        Vec3(0, 1, 0);      // unit, shading normal, on the side the asset's author gave it
+    Vec3 albedo = Vec3(0);  // linear base colour: material x texture x vertex colour
+    uint32_t material = 0;  // index into Scene::materials
+    uint32_t object = 0;    // hash of the instance path, 0 where there is nothing
 };
 
 }  // namespace stipple

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Mip chains and lookups. Colours are averaged as linear light and weighted by alpha, so that what is cut away
-// (often black or white) does not bleed into leaves.
+// Mip chains and lookups. Colours are averaged as linear light and weighted by alpha, so that what
+// is cut away (often black or white) does not bleed into leaves.
 #include <core/image.h>
 #include <core/material.h>
 
@@ -10,7 +10,8 @@ namespace stipple {
 
 namespace {
 
-// Linear RGB multiplied with alpha, and alpha. Where all is transparent the plain colour is kept aside.
+// Linear RGB multiplied with alpha, and alpha. Where all is transparent the plain colour is kept
+// aside.
 struct Weighted {
     Vec4 premultiplied = Vec4(0.0f);
     Vec3 plain = Vec3(0.0f);
@@ -28,7 +29,8 @@ struct Weighted {
 const std::array<float, 256>& byteToLinear(bool srgb) {
     static const auto tables = [] {
         std::array<std::array<float, 256>, 2> t;
-        for (int i = 0; i < 256; ++i) t[0][i] = float(i) / 255.0f, t[1][i] = linearFromSrgb(float(i) / 255.0f);
+        for (int i = 0; i < 256; ++i)
+            t[0][i] = float(i) / 255.0f, t[1][i] = linearFromSrgb(float(i) / 255.0f);
         return t;
     }();
     return tables[srgb];
@@ -41,7 +43,8 @@ Vec4 readTexel(const Texture::Level& level, const std::array<float, 256>& linear
 
 uint8_t toByte(float value) { return uint8_t(std::clamp(value, 0.0f, 1.0f) * 255.0f + 0.5f); }
 
-// The source texels that texel i of a level of n_target covers, of n_source, and their shares of it.
+// The source texels that texel i of a level of n_target covers, of n_source, and their shares of
+// it.
 struct Taps {
     int first = 0;
     int count = 0;
@@ -53,14 +56,16 @@ Taps boxTaps(int i, int n_source, int n_target) {
     Taps taps;
     taps.first = int(lo);
     for (int x = taps.first; x < std::min(n_source, int(std::ceil(hi))) && taps.count < 3; ++x) {
-        taps.weight[taps.count++] = float((std::min(hi, x + 1.0) - std::max(lo, double(x))) / (hi - lo));
+        taps.weight[taps.count++] =
+            float((std::min(hi, x + 1.0) - std::max(lo, double(x))) / (hi - lo));
     }
     return taps;
 }
 
 // Half the size, rounded up. read(x, y): a texel of the source, linear.
 template <class Read>
-std::vector<Vec4> halve(int source_width, int source_height, int width, int height, const Read& read) {
+std::vector<Vec4> halve(int source_width, int source_height, int width, int height,
+                        const Read& read) {
     std::vector<Vec4> result(size_t(width) * height);
     for (int y = 0; y < height; ++y) {
         const Taps rows = boxTaps(y, source_height, height);
@@ -69,7 +74,8 @@ std::vector<Vec4> halve(int source_width, int source_height, int width, int heig
             Weighted sum;
             for (int j = 0; j < rows.count; ++j) {
                 for (int i = 0; i < columns.count; ++i) {
-                    sum.add(read(columns.first + i, rows.first + j), columns.weight[i] * rows.weight[j]);
+                    sum.add(read(columns.first + i, rows.first + j),
+                            columns.weight[i] * rows.weight[j]);
                 }
             }
             result[size_t(y) * width + x] = sum.color();
@@ -107,7 +113,8 @@ Vec4 sampleLevel(const Texture& texture, const Texture::Level& level, float u, f
         const int row = wrapTexel(y0 + j, level.height, texture.wrap_v);
         for (int i = 0; i < 2; ++i) {
             const int column = wrapTexel(x0 + i, level.width, texture.wrap_u);
-            sum.add(readTexel(level, linear, column, row), (i ? fx : 1.0f - fx) * (j ? fy : 1.0f - fy));
+            sum.add(readTexel(level, linear, column, row),
+                    (i ? fx : 1.0f - fx) * (j ? fy : 1.0f - fy));
         }
     }
     return sum.color();
@@ -133,11 +140,13 @@ void buildMipmaps(Texture& texture) {
                                   [&, &linear = byteToLinear(texture.srgb)](int x, int y) {
                                       return readTexel(texture.levels[0], linear, x, y);
                                   })
-                          : halve(width, height, w, h, [&](int x, int y) { return finer[size_t(y) * width + x]; });
+                          : halve(width, height, w, h,
+                                  [&](int x, int y) { return finer[size_t(y) * width + x]; });
         Texture::Level level{w, h, std::vector<uint8_t>(texels.size() * 4)};
         for (size_t i = 0; i < texels.size(); ++i) {
             for (int c = 0; c < 3; ++c) {
-                level.rgba[i * 4 + c] = toByte(texture.srgb ? srgbFromLinear(texels[i][c]) : texels[i][c]);
+                level.rgba[i * 4 + c] =
+                    toByte(texture.srgb ? srgbFromLinear(texels[i][c]) : texels[i][c]);
             }
             level.rgba[i * 4 + 3] = toByte(texels[i].a);
         }

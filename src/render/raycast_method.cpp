@@ -13,7 +13,8 @@ namespace {
 
 constexpr int kTilePixels = 16;
 
-// Offset of ray i of n in the pixel, in [0,1)^2: jittered in the cells of the squarest grid that n fills, over which what is left is random.
+// Offset of ray i of n in the pixel, in [0,1)^2: jittered in the cells of the squarest grid that n
+// fills, over which what is left is random.
 Vec2 pixelOffset(int i, int n, uint64_t pixel_key) {
     if (n == 1) return Vec2(0.5f);
     const int side = int(std::sqrt(double(n)) + 1e-9);
@@ -25,21 +26,25 @@ Vec2 pixelOffset(int i, int n, uint64_t pixel_key) {
 
 }  // namespace
 
-void drawRays(const RayCaster& caster, const View& view, const std::vector<Material>& materials, const Lighting& lighting,
-              ThreadPool& pool, const FrameRequest& request, Picture& picture, FrameStats& stats) {
+void drawRays(const RayCaster& caster, const View& view, const std::vector<Material>& materials,
+              const Lighting& lighting, ThreadPool& pool, const FrameRequest& request,
+              Picture& picture, FrameStats& stats) {
     const Stopwatch watch;
     const int n_rays = std::max(1, int(std::lround(request.settings.samples)));
     const Mat3 world_from_camera(glm::transpose(view.camera_from_world));
-    const int columns = (view.width + kTilePixels - 1) / kTilePixels, rows = (view.height + kTilePixels - 1) / kTilePixels;
+    const int columns = (view.width + kTilePixels - 1) / kTilePixels,
+              rows = (view.height + kTilePixels - 1) / kTilePixels;
     const float s = float(view.subpixels);
     // A ray stands for its share of the pixel; in perspective it widens with depth.
-    const float footprint = view.orthographic ? 0.0f : s / float(view.focal) / std::sqrt(float(n_rays));
+    const float footprint =
+        view.orthographic ? 0.0f : s / float(view.focal) / std::sqrt(float(n_rays));
     std::atomic<size_t> done{0};
     std::mutex progress_mutex;
     pool.forEach(size_t(columns) * size_t(rows), [&](size_t t, int) {
         if (request.cancel && request.cancel->requested) return;
         const int x0 = int(t % columns) * kTilePixels, y0 = int(t / columns) * kTilePixels;
-        const int x1 = std::min(x0 + kTilePixels, view.width), y1 = std::min(y0 + kTilePixels, view.height);
+        const int x1 = std::min(x0 + kTilePixels, view.width),
+                  y1 = std::min(y0 + kTilePixels, view.height);
         // One stratum of all the tile's pixels at a time: neighbouring rays are coherent.
         std::vector<PixelSums> sums(kTilePixels * kTilePixels);
         std::vector<Ray> rays;
@@ -48,10 +53,12 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
             rays.clear();
             for (int y = y0; y < y1; ++y) {
                 for (int x = x0; x < x1; ++x) {
-                    const Vec2 o = pixelOffset(i, n_rays, hashCombine(request.settings.seed, uint64_t(x), uint64_t(y)));
+                    const Vec2 o = pixelOffset(
+                        i, n_rays, hashCombine(request.settings.seed, uint64_t(x), uint64_t(y)));
                     Vec3 origin, direction;
                     view.ray((float(x) + o.x) * s, (float(y) + o.y) * s, origin, direction);
-                    rays.push_back({world_from_camera * origin, view.near_z, world_from_camera * direction, view.far_z});
+                    rays.push_back({world_from_camera * origin, view.near_z,
+                                    world_from_camera * direction, view.far_z});
                 }
             }
             hits.assign(rays.size(), {});
@@ -65,7 +72,8 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
                 }
                 SurfaceSample sample;
                 sample.depth = hit.t;
-                sample.position_camera = Mat3(view.camera_from_world) * (rays[r].origin + rays[r].direction * hit.t);
+                sample.position_camera =
+                    Mat3(view.camera_from_world) * (rays[r].origin + rays[r].direction * hit.t);
                 sample.normal_world = hit.normal_world;
                 sample.albedo = hit.albedo;
                 sample.material = hit.material;
@@ -84,8 +92,10 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
             request.progress("draw", double(n) / (double(columns) * rows));
         }
     });
-    if (request.cancel && request.cancel->requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
-    stats.points_drawn = stats.points_kept = uint64_t(n_rays) * uint64_t(view.width) * uint64_t(view.height);
+    if (request.cancel && request.cancel->requested)
+        throw Error(ErrorCode::kCancelled, "", "cancelled");
+    stats.points_drawn = stats.points_kept =
+        uint64_t(n_rays) * uint64_t(view.width) * uint64_t(view.height);
     stats.phases.emplace_back("draw", watch.seconds());
 }
 

@@ -30,14 +30,15 @@ struct Renderer::Impl {
     RandomizedSampler sampler;
     std::unique_ptr<Rasterizer> rasterizer;  // started when first needed
     RasterTarget target;
-    std::unique_ptr<RayCaster> caster;       // built when first needed, for caster_origin
+    std::unique_ptr<RayCaster> caster;  // built when first needed, for caster_origin
     DVec3 caster_origin = DVec3(0.0);
 
     Impl(const Scene& s, ThreadPool& p) : scene(s), pool(p), sampler(s) {}
 
-    // From the plan to the picture: large triangles to the z-buffer, points to the tiles, both into one depth test.
-    void drawPlan(const FrameRequest& request, const View& view, const FramePlan& plan, PointSource* source,
-                  Picture& picture, FrameStats& stats) {
+    // From the plan to the picture: large triangles to the z-buffer, points to the tiles, both into
+    // one depth test.
+    void drawPlan(const FrameRequest& request, const View& view, const FramePlan& plan,
+                  PointSource* source, Picture& picture, FrameStats& stats) {
         ReconstructionContext context;
         context.view = view;
         context.settings = request.settings;
@@ -47,21 +48,25 @@ struct Renderer::Impl {
         const Stopwatch raster_watch;
         if (!plan.raster.draws.empty()) {
             if (!rasterizer) {
-                rasterizer = makeOsmesaRasterizer(rasterMeshes(scene), scene.materials, scene.textures, pool.threadCount());
+                rasterizer = makeOsmesaRasterizer(rasterMeshes(scene), scene.materials,
+                                                  scene.textures, pool.threadCount());
             }
             rasterizer->render(view, plan.raster, target);
             context.base = &target;
         }
         stats.phases.emplace_back("raster", raster_watch.seconds());
         stats.large_triangles = plan.raster_triangles;
-        const TriangleLookup triangle_lookup = [&](uint32_t number, float x, float y, SurfaceSample& sample) {
+        const TriangleLookup triangle_lookup = [&](uint32_t number, float x, float y,
+                                                   SurfaceSample& sample) {
             rasterAttributes(scene, view, plan, number, x, y, sample);
         };
         drawTiles(context, source, plan.batches, triangle_lookup, pool, request, stats);
-        stats.overestimation = stats.points_kept ? double(stats.points_drawn) / double(stats.points_kept) : 0.0;
+        stats.overestimation =
+            stats.points_kept ? double(stats.points_drawn) / double(stats.points_kept) : 0.0;
     }
 
-    void drawPoints(const FrameRequest& request, const View& view, Picture& picture, FrameStats& stats) {
+    void drawPoints(const FrameRequest& request, const View& view, Picture& picture,
+                    FrameStats& stats) {
         const Stopwatch plan_watch;
         const FramePlan& plan = sampler.plan(view, request.settings, pool, request.cancel);
         stats.phases.emplace_back("plan", plan_watch.seconds());
@@ -69,12 +74,15 @@ struct Renderer::Impl {
         stats.cache_bytes = sampler.cacheBytes();
     }
 
-    void drawZBuffer(const FrameRequest& request, const View& view, Picture& picture, FrameStats& stats) {
+    void drawZBuffer(const FrameRequest& request, const View& view, Picture& picture,
+                     FrameStats& stats) {
         const double triangles = sceneSize(scene).triangles_total;
         if (triangles > kZBufferLimit) {
             char message[160];
             std::snprintf(message, sizeof message,
-                          "--method zbuffer draws every triangle and is refused above 10^9 (this scene has %.3g)", triangles);
+                          "--method zbuffer draws every triangle and is refused above 10^9 (this "
+                          "scene has %.3g)",
+                          triangles);
             throw Error(ErrorCode::kInvalidArgument, "", message);
         }
         const Stopwatch plan_watch;
@@ -83,7 +91,8 @@ struct Renderer::Impl {
         drawPlan(request, view, plan, nullptr, picture, stats);
     }
 
-    void drawRaycast(const FrameRequest& request, const View& view, Picture& picture, FrameStats& stats) {
+    void drawRaycast(const FrameRequest& request, const View& view, Picture& picture,
+                     FrameStats& stats) {
         if (!caster || caster_origin != view.eye_world) {
             const Stopwatch build_watch;
             caster.reset();
@@ -95,18 +104,26 @@ struct Renderer::Impl {
     }
 };
 
-Renderer::Renderer(const Scene& scene, ThreadPool& pool) : impl_(std::make_unique<Impl>(scene, pool)) {}
+Renderer::Renderer(const Scene& scene, ThreadPool& pool)
+    : impl_(std::make_unique<Impl>(scene, pool)) {}
 Renderer::~Renderer() = default;
 
 Frame Renderer::render(const FrameRequest& request) {
     Frame frame;
-    const View view = makeView(request.camera, request.settings.width, request.settings.height, request.settings.subpixels);
+    const View view = makeView(request.camera, request.settings.width, request.settings.height,
+                               request.settings.subpixels);
     const Stopwatch watch;
     Picture picture(view, impl_->scene.lighting, request.aovs, request.transparent);
     switch (request.settings.method) {
-        case Method::kPoints: impl_->drawPoints(request, view, picture, frame.stats); break;
-        case Method::kZBuffer: impl_->drawZBuffer(request, view, picture, frame.stats); break;
-        case Method::kRaycast: impl_->drawRaycast(request, view, picture, frame.stats); break;
+        case Method::kPoints:
+            impl_->drawPoints(request, view, picture, frame.stats);
+            break;
+        case Method::kZBuffer:
+            impl_->drawZBuffer(request, view, picture, frame.stats);
+            break;
+        case Method::kRaycast:
+            impl_->drawRaycast(request, view, picture, frame.stats);
+            break;
     }
     frame.stats.seconds = watch.seconds();
     for (const auto& [name, seconds] : frame.stats.phases) {

@@ -17,39 +17,45 @@
 namespace stipple {
 
 struct FrameStats {
-    // In order; names as in the --stats contract: build, plan, raster, draw, reconstruct, shade (seconds of wall time).
+    // In order; names as in the --stats contract: build, plan, raster, draw, reconstruct, shade
+    // (seconds of wall time).
     std::vector<std::pair<std::string, double>> phases;
-    double seconds = 0.0;             // from view to shaded picture
-    uint64_t points_drawn = 0;        // emitted by the sources
-    uint64_t points_kept = 0;         // after thinning, within the picture
-    uint64_t points_culled = 0;       // in batches that were skipped as hidden
+    double seconds = 0.0;        // from view to shaded picture
+    uint64_t points_drawn = 0;   // emitted by the sources
+    uint64_t points_kept = 0;    // after thinning, within the picture
+    uint64_t points_culled = 0;  // in batches that were skipped as hidden
     uint64_t batches = 0;
-    uint64_t large_triangles = 0;     // given to the z-buffer
-    double overestimation = 0.0;      // points drawn in the frustum / points needed
-    size_t cache_bytes = 0;           // of the point lists
+    uint64_t large_triangles = 0;  // given to the z-buffer
+    uint64_t small_triangles = 0;  // rasterized in tiles
+    double overestimation = 0.0;   // points drawn in the frustum / points needed
+    size_t cache_bytes = 0;        // of the point lists
 };
 
 struct Frame {
-    Image image;  // linear: R, G, B, A (premultiplied background-free if transparent) and the AOV channels asked for
+    Image image;  // linear: R, G, B, A (premultiplied background-free if transparent) and the AOV
+                  // channels asked for
     FrameStats stats;
 };
 
 struct FrameRequest {
     Camera camera;
     RenderSettings settings;
-    bool transparent = false;         // leave the background out; A is coverage
-    std::vector<std::string> aovs;    // depth, normal, albedo, object, coverage, count
-    std::string debug_pixel;          // "x,y": print what happens there to stderr
+    bool transparent = false;       // leave the background out; A is coverage
+    std::vector<std::string> aovs;  // depth, normal, albedo, object, coverage, count
+    std::string debug_pixel;        // "x,y": print what happens there to stderr
     const CancelFlag* cancel = nullptr;
-    std::function<void(const char* phase, double fraction)> progress;  // may be empty; called from one thread at a time
+    std::function<void(const char* phase, double fraction)>
+        progress;  // may be empty; called from one thread at a time
 };
 
-// Keeps what outlives a frame: point lists, uploaded meshes, Embree's scenes. Not thread-safe; one per scene.
+// Keeps what outlives a frame: point lists, uploaded meshes, Embree's scenes. Not thread-safe; one
+// per scene.
 class Renderer {
 public:
     Renderer(const Scene& scene, ThreadPool& pool);
     ~Renderer();
-    // Throws Error(kCancelled) if cancelled, kInvalidArgument for impossible settings (zbuffer above 10^9 triangles).
+    // Throws Error(kCancelled) if cancelled, kInvalidArgument for impossible settings (zbuffer
+    // above 10^9 triangles).
     Frame render(const FrameRequest& request);
 
 private:

@@ -22,8 +22,10 @@ std::vector<Tile> makeTiles(const View& view, int tile_subpixels, int halo) {
     for (int y = 0; y < view.subHeight(); y += side) {
         for (int x = 0; x < view.subWidth(); x += side) {
             Tile tile;
-            tile.inner = {x, y, std::min(x + side, view.subWidth()), std::min(y + side, view.subHeight())};
-            tile.outer = {std::max(0, x - halo), std::max(0, y - halo), std::min(tile.inner.x1 + halo, view.subWidth()),
+            tile.inner = {x, y, std::min(x + side, view.subWidth()),
+                          std::min(y + side, view.subHeight())};
+            tile.outer = {std::max(0, x - halo), std::max(0, y - halo),
+                          std::min(tile.inner.x1 + halo, view.subWidth()),
                           std::min(tile.inner.y1 + halo, view.subHeight())};
             tiles.push_back(std::move(tile));
         }
@@ -31,19 +33,22 @@ std::vector<Tile> makeTiles(const View& view, int tile_subpixels, int halo) {
     return tiles;
 }
 
-void sortIntoTiles(const std::vector<Batch>& batches, const View& view, int tile_subpixels, int halo,
-                   std::vector<Tile>& tiles) {
+void sortIntoTiles(const std::vector<Batch>& batches, const View& view, int tile_subpixels,
+                   int halo, std::vector<Tile>& tiles) {
     std::vector<uint32_t> order(batches.size());
     for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
         return batches[a].z_min != batches[b].z_min ? batches[a].z_min < batches[b].z_min : a < b;
     });
     const int side = std::max(1, tile_subpixels / view.subpixels) * view.subpixels;
-    const int columns = (view.subWidth() + side - 1) / side, rows = (view.subHeight() + side - 1) / side;
+    const int columns = (view.subWidth() + side - 1) / side,
+              rows = (view.subHeight() + side - 1) / side;
     for (const uint32_t b : order) {
         const SubpixelRect& r = batches[b].rect;
-        const int x0 = std::max(0, (r.x0 - halo) / side), x1 = std::min(columns - 1, (r.x1 - 1 + halo) / side);
-        const int y0 = std::max(0, (r.y0 - halo) / side), y1 = std::min(rows - 1, (r.y1 - 1 + halo) / side);
+        const int x0 = std::max(0, (r.x0 - halo) / side),
+                  x1 = std::min(columns - 1, (r.x1 - 1 + halo) / side);
+        const int y0 = std::max(0, (r.y0 - halo) / side),
+                  y1 = std::min(rows - 1, (r.y1 - 1 + halo) / side);
         for (int y = y0; y <= y1; ++y) {
             for (int x = x0; x <= x1; ++x) {
                 Tile& tile = tiles[size_t(y) * columns + x];
@@ -55,7 +60,8 @@ void sortIntoTiles(const std::vector<Batch>& batches, const View& view, int tile
 
 class NumberLookup : public SampleLookup {
 public:
-    NumberLookup(const TileEmitter* emitter, const TriangleLookup& triangles) : emitter_(emitter), triangles_(triangles) {}
+    NumberLookup(const TileEmitter* emitter, const TriangleLookup& triangles)
+        : emitter_(emitter), triangles_(triangles) {}
     void lookUp(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample) const override {
         if (number & kZBufferBit) {
             triangles_(number & ~kZBufferBit, sub_x, sub_y, sample);
@@ -79,8 +85,9 @@ struct Worker {
 
 }  // namespace
 
-void drawTiles(const ReconstructionContext& context, PointSource* source, const std::vector<Batch>& batches,
-               const TriangleLookup& triangle_lookup, ThreadPool& pool, const FrameRequest& request, FrameStats& stats) {
+void drawTiles(const ReconstructionContext& context, PointSource* source,
+               const std::vector<Batch>& batches, const TriangleLookup& triangle_lookup,
+               ThreadPool& pool, const FrameRequest& request, FrameStats& stats) {
     const int halo = makeReconstruction(context)->halo();
     std::vector<Tile> tiles = makeTiles(context.view, context.settings.tile_size, halo);
     sortIntoTiles(batches, context.view, context.settings.tile_size, halo, tiles);
@@ -123,7 +130,8 @@ void drawTiles(const ReconstructionContext& context, PointSource* source, const 
             request.progress("draw", double(n) / double(tiles.size()));
         }
     });
-    if (request.cancel && request.cancel->requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
+    if (request.cancel && request.cancel->requested)
+        throw Error(ErrorCode::kCancelled, "", "cancelled");
 
     double draw = 0.0, finish = 0.0;
     for (const Worker& worker : workers) {
@@ -132,6 +140,7 @@ void drawTiles(const ReconstructionContext& context, PointSource* source, const 
         stats.points_drawn += counters.points_drawn;
         stats.points_kept += counters.points_kept;
         stats.points_culled += worker.culled;
+        stats.small_triangles += counters.triangles;
         draw += worker.draw_seconds;
         finish += worker.finish_seconds;
     }

@@ -11,11 +11,14 @@
 namespace stipple {
 
 // Attributes of rasterized triangles, by number (without kZBufferBit).
-using TriangleLookup = std::function<void(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample)>;
+using TriangleLookup =
+    std::function<void(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample)>;
 
-// Draws all batches of `source` (nullptr: none) into context.picture. Tiles in which nothing changes what another tile shows; the same
-// bits for any number of threads. Adds counters and the times of drawing, reconstructing and shading to stats.
-void drawTiles(const ReconstructionContext& context, PointSource* source, const std::vector<Batch>& batches,
-               const TriangleLookup& triangle_lookup, ThreadPool& pool, const FrameRequest& request, FrameStats& stats);
+// Draws all batches of `source` (nullptr: none) into context.picture. Tiles in which nothing
+// changes what another tile shows; the same bits for any number of threads. Adds counters and the
+// times of drawing, reconstructing and shading to stats.
+void drawTiles(const ReconstructionContext& context, PointSource* source,
+               const std::vector<Batch>& batches, const TriangleLookup& triangle_lookup,
+               ThreadPool& pool, const FrameRequest& request, FrameStats& stats);
 
 }  // namespace stipple

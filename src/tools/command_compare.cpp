@@ -20,25 +20,34 @@ using Json = nlohmann::ordered_json;
 
 const HelpText kHelp = {
     "stipple compare A B [--json] [-o DIFF.png] [--fail-below DB]",
-    "Measures how much picture A differs from the reference B: PSNR and RMSE of the sRGB-encoded colours, FLIP at 67 pixels a "
-    "degree, the relative difference of luminance over tiles of 32 x 32 pixels and, if A has the channels coverage and depth and "
-    "B coverage and depth_max (a ray-cast .exr), holes. Exit code 0 if they could be compared, 4 if they fall below the limit "
+    "Measures how much picture A differs from the reference B: PSNR and RMSE of the sRGB-encoded "
+    "colours, FLIP at 67 pixels a "
+    "degree, the relative difference of luminance over tiles of 32 x 32 pixels and, if A has the "
+    "channels coverage and depth and "
+    "B coverage and depth_max (a ray-cast .exr), holes. Exit code 0 if they could be compared, 4 "
+    "if they fall below the limit "
     "of --fail-below, 5 if their sizes differ.",
-    {"stipple compare points.png raycast.png", "stipple compare points.exr raycast.exr --json -o difference.png --fail-below 30"}};
+    {"stipple compare points.png raycast.png",
+     "stipple compare points.exr raycast.exr --json -o difference.png --fail-below 30"}};
 
-std::string sizeText(const Image& image) { return std::to_string(image.width) + " x " + std::to_string(image.height); }
+std::string sizeText(const Image& image) {
+    return std::to_string(image.width) + " x " + std::to_string(image.height);
+}
 
 Json measuresJson(const CompareResult& result, const TileMeans& tiles) {
-    Json json = {{"schema", 1},
-                 {"pixels", result.pixels},
-                 {"identical", result.rmse == 0.0},
-                 // JSON has no infinity: equal pictures have no PSNR.
-                 {"psnr_db", std::isfinite(result.psnr) ? Json(result.psnr) : Json(nullptr)},
-                 {"rmse", result.rmse},
-                 {"flip", result.flip},
-                 {"tiles", {{"count", tiles.tiles}, {"mean", tiles.mean}, {"rms", tiles.rms}, {"max", tiles.max}}}};
+    Json json = {
+        {"schema", 1},
+        {"pixels", result.pixels},
+        {"identical", result.rmse == 0.0},
+        // JSON has no infinity: equal pictures have no PSNR.
+        {"psnr_db", std::isfinite(result.psnr) ? Json(result.psnr) : Json(nullptr)},
+        {"rmse", result.rmse},
+        {"flip", result.flip},
+        {"tiles",
+         {{"count", tiles.tiles}, {"mean", tiles.mean}, {"rms", tiles.rms}, {"max", tiles.max}}}};
     json["holes"] = nullptr;
-    if (result.holes) json["holes"] = {{"count", result.holes->count}, {"fraction", result.holes->fraction}};
+    if (result.holes)
+        json["holes"] = {{"count", result.holes->count}, {"fraction", result.holes->fraction}};
     return json;
 }
 
@@ -64,10 +73,12 @@ ExitCode runCompare(const std::vector<std::string>& arguments) {
     app.add_option("B", path_b, "the reference")->required()->group("Arguments");
     app.add_flag("--json", as_json, "print JSON");
     app.add_option("-o,--output", difference,
-                   "write a picture of the differences: black where none is seen, then red, yellow, white; holes in cyan")
+                   "write a picture of the differences: black where none is seen, then red, "
+                   "yellow, white; holes in cyan")
         ->type_name("DIFF.png");
     const CLI::Option* limit =
-        app.add_option("--fail-below", fail_below_db, "exit with code 4 if the PSNR is lower (dB; default: no limit)")
+        app.add_option("--fail-below", fail_below_db,
+                       "exit with code 4 if the PSNR is lower (dB; default: no limit)")
             ->type_name("DB");
     if (!parseArguments(app, kHelp, arguments)) return ExitCode::kDone;
     if (!difference.empty()) checkOutputFile("-o", difference, {".png", ".exr"});
@@ -76,7 +87,8 @@ ExitCode runCompare(const std::vector<std::string>& arguments) {
     const Image a = loadImage(path_a);
     const Image b = loadImage(path_b);
     if (a.width != b.width || a.height != b.height) {
-        printMessage("not comparable: " + path_a + " is " + sizeText(a) + ", " + path_b + " is " + sizeText(b));
+        printMessage("not comparable: " + path_a + " is " + sizeText(a) + ", " + path_b + " is " +
+                     sizeText(b));
         return ExitCode::kNotComparable;
     }
     ThreadPool pool;

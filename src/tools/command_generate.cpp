@@ -18,7 +18,8 @@ namespace {
 
 const HelpText kHelp = {
     "stipple generate KIND [--count N] [--size M] [--seed N] [--species NAME] -o FILE",
-    "Makes a model (tree, grass, rock, terrain), written as .glb, or a scene (forest, landscape), written as .scene.json, and "
+    "Makes a model (tree, grass, rock, terrain), written as .glb, or a scene (forest, landscape), "
+    "written as .scene.json, and "
     "prints the file's path. The same arguments give the same file.",
     {"stipple generate tree --species birch --count 50000 -o birch.glb",
      "stipple generate landscape --count 1000000000 -o landscape.scene.json"}};
@@ -40,12 +41,10 @@ struct Kind {
     uint64_t most_count;
 };
 
-const std::vector<Kind> kKinds = {{"tree", false, 20000, 1000, 2000000},
-                                  {"grass", false, 120, 1, 200000},
-                                  {"rock", false, 5120, 20, 1310720},
-                                  {"terrain", false, 524288, 2, 33554432},
-                                  {"forest", true, 100000, 1, 100000000},
-                                  {"landscape", true, 1000000000, 1, 10000000000000}};
+const std::vector<Kind> kKinds = {
+    {"tree", false, 20000, 1000, 2000000},  {"grass", false, 120, 1, 200000},
+    {"rock", false, 5120, 20, 1310720},     {"terrain", false, 524288, 2, 33554432},
+    {"forest", true, 100000, 1, 100000000}, {"landscape", true, 1000000000, 1, 10000000000000}};
 
 const Kind& findKind(const std::string& name) {
     std::vector<std::string> names;
@@ -54,9 +53,10 @@ const Kind& findKind(const std::string& name) {
         names.push_back(kind.name);
     }
     const std::string nearest = nearestName(name, names);
-    throw Error(ErrorCode::kInvalidArgument, "",
-                "cannot generate '" + name + "'" +
-                    (nearest.empty() ? "; --help lists the kinds" : "; did you mean '" + nearest + "'?"));
+    throw Error(
+        ErrorCode::kInvalidArgument, "",
+        "cannot generate '" + name + "'" +
+            (nearest.empty() ? "; --help lists the kinds" : "; did you mean '" + nearest + "'?"));
 }
 
 GeneratedMesh makeModel(const GenerateOptions& options) {
@@ -93,10 +93,12 @@ GeneratedMesh makeModel(const GenerateOptions& options) {
 void writeScene(const GenerateOptions& options) {
     const std::string suffix = ".scene.json";
     if (!options.output.ends_with(suffix)) {
-        throw Error(ErrorCode::kInvalidArgument, "-o", "'" + options.output + "' must end in " + suffix);
+        throw Error(ErrorCode::kInvalidArgument, "-o",
+                    "'" + options.output + "' must end in " + suffix);
     }
     const GeneratedSceneParams params = {options.count, options.seed, options.size};
-    saveFile(options.output, options.kind == "forest" ? forestSceneJson(params) : landscapeSceneJson(params));
+    saveFile(options.output,
+             options.kind == "forest" ? forestSceneJson(params) : landscapeSceneJson(params));
 }
 
 }  // namespace
@@ -104,16 +106,22 @@ void writeScene(const GenerateOptions& options) {
 ExitCode runGenerate(const std::vector<std::string>& arguments) {
     CLI::App app;
     GenerateOptions options;
-    app.add_option("KIND", options.kind, "tree, grass, rock, terrain, forest or landscape")->required()->group("Arguments");
-    app.add_option("-o,--output", options.output, "models: .glb; scenes: .scene.json")->required()->type_name("FILE");
+    app.add_option("KIND", options.kind, "tree, grass, rock, terrain, forest or landscape")
+        ->required()
+        ->group("Arguments");
+    app.add_option("-o,--output", options.output, "models: .glb; scenes: .scene.json")
+        ->required()
+        ->type_name("FILE");
     const CLI::Option* count =
         app.add_option("--count", options.count,
-                       "about how many: triangles of a tree (default 20000), a rock (5120) or a terrain (524288); blades of "
+                       "about how many: triangles of a tree (default 20000), a rock (5120) or a "
+                       "terrain (524288); blades of "
                        "grass (120); instances in a forest (100000) or a landscape (1000000000)")
             ->type_name("N");
     const CLI::Option* size =
         app.add_option("--size", options.size,
-                       "height of a tree (default: its species') or of grass (0.35), diameter of a rock (2), side of a "
+                       "height of a tree (default: its species') or of grass (0.35), diameter of a "
+                       "rock (2), side of a "
                        "terrain (1000) or a forest (as the count asks for); metres")
             ->type_name("M")
             ->check(CLI::Range(0.001, 1e6).description(""));
@@ -121,18 +129,23 @@ ExitCode runGenerate(const std::vector<std::string>& arguments) {
         ->type_name("N")
         ->check(CLI::Range(uint64_t(0), uint64_t(1) << 52).description(""));
     const CLI::Option* species =
-        app.add_option("--species", options.species, "of a tree: oak, birch, spruce or pine (default oak)")->type_name("NAME");
+        app.add_option("--species", options.species,
+                       "of a tree: oak, birch, spruce or pine (default oak)")
+            ->type_name("NAME");
     if (!parseArguments(app, kHelp, arguments)) return ExitCode::kDone;
 
     const Kind& kind = findKind(options.kind);
     if (count->count() == 0) options.count = kind.default_count;
     if (options.count < kind.least_count || options.count > kind.most_count) {
         throw Error(ErrorCode::kInvalidArgument, "--count",
-                    "a " + kind.name + " takes " + std::to_string(kind.least_count) + ".." + std::to_string(kind.most_count));
+                    "a " + kind.name + " takes " + std::to_string(kind.least_count) + ".." +
+                        std::to_string(kind.most_count));
     }
-    if (species->count() > 0 && kind.name != "tree") throw Error(ErrorCode::kInvalidArgument, "--species", "is for trees");
+    if (species->count() > 0 && kind.name != "tree")
+        throw Error(ErrorCode::kInvalidArgument, "--species", "is for trees");
     if (size->count() > 0 && kind.name == "landscape") {
-        throw Error(ErrorCode::kInvalidArgument, "--size", "a landscape's size follows from --count");
+        throw Error(ErrorCode::kInvalidArgument, "--size",
+                    "a landscape's size follows from --count");
     }
     checkOutputFile("-o", options.output, {kind.is_scene ? ".json" : ".glb"});
     if (kind.is_scene) {

@@ -10,9 +10,10 @@ ExitCode runHelp(const std::vector<std::string>& arguments) {
     CLI::App app;
     std::string topic;
     app.add_option("TOPIC", topic, "a command, or 'settings'")->group("Arguments");
-    const HelpText help = {"stipple help [settings|COMMAND]",
-                           "Explains a command, or lists all settings with their values and defaults.",
-                           {"stipple help render", "stipple help settings"}};
+    const HelpText help = {
+        "stipple help [settings|COMMAND]",
+        "Explains a command, or lists all settings with their values and defaults.",
+        {"stipple help render", "stipple help settings"}};
     if (!parseArguments(app, help, arguments)) return ExitCode::kDone;
     if (topic.empty()) {
         std::cout << shortUsage();

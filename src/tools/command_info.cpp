@@ -16,7 +16,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 const HelpText kHelp = {"stipple info SCENE [--json]",
-                        "Prints what is in a scene: instances, unique and expanded triangles, memory, groups with their "
+                        "Prints what is in a scene: instances, unique and expanded triangles, "
+                        "memory, groups with their "
                         "depth, cameras and materials.",
                         {"stipple info scenes/forest.scene.json", "stipple info tree.glb --json"}};
 
@@ -77,7 +78,8 @@ std::string groupedDigits(double count) {
 
 std::string byteSize(double bytes) {
     char text[64];
-    std::snprintf(text, sizeof text, bytes < 1e6 ? "%.1f kB" : "%.1f MB", bytes / (bytes < 1e6 ? 1e3 : 1e6));
+    std::snprintf(text, sizeof text, bytes < 1e6 ? "%.1f kB" : "%.1f MB",
+                  bytes / (bytes < 1e6 ? 1e3 : 1e6));
     return text;
 }
 
@@ -93,21 +95,22 @@ std::string joinNames(const Json& names) {
 void printInfo(const Json& info) {
     std::ostream& out = std::cout;
     out << "scene       " << info["path"].get<std::string>() << "\n"
-        << "instances   " << groupedDigits(info["instances"]) << " (" << groupedDigits(info["instances_stored"])
-        << " stored)\n"
+        << "instances   " << groupedDigits(info["instances"]) << " ("
+        << groupedDigits(info["instances_stored"]) << " stored)\n"
         << "triangles   " << groupedDigits(info["triangles_unique"]) << " unique, "
         << groupedDigits(info["triangles_total"]) << " expanded\n"
-        << "memory      " << byteSize(info["bytes"]) << ", of that " << byteSize(info["instance_bytes"])
-        << " for instances\n"
+        << "memory      " << byteSize(info["bytes"]) << ", of that "
+        << byteSize(info["instance_bytes"]) << " for instances\n"
         << "cameras     " << joinNames(info["cameras"]) << "\n"
         << "materials   " << joinNames(info["materials"]) << "\n"
         << "textures    " << info["textures"] << "\n";
     out << "groups\n";
     for (const Json& group : info["groups"]) {
         out << "  " << group["name"].get<std::string>() << ": depth " << group["depth"] << ", "
-            << groupedDigits(group["instances"]) << " instances (" << groupedDigits(group["instances_stored"])
-            << " stored), " << groupedDigits(group["triangles"]) << " triangles"
-            << (group["root"] ? ", root" : "") << "\n";
+            << groupedDigits(group["instances"]) << " instances ("
+            << groupedDigits(group["instances_stored"]) << " stored), "
+            << groupedDigits(group["triangles"]) << " triangles" << (group["root"] ? ", root" : "")
+            << "\n";
     }
     out << "assets\n";
     for (const Json& asset : info["assets"]) {
@@ -125,7 +128,8 @@ ExitCode runInfo(const std::vector<std::string>& arguments) {
     bool as_json = false;
     app.add_option("SCENE", path, "*.scene.json, .gltf or .glb")->required()->group("Arguments");
     app.add_flag("--json", as_json, "print JSON");
-    app.add_flag("--allow-outside", load_options.allow_outside, "let the scene's paths leave its folder");
+    app.add_flag("--allow-outside", load_options.allow_outside,
+                 "let the scene's paths leave its folder");
     app.add_option("--memory-limit", load_options.memory_limit_mb,
                    "most memory that loading may take, in MB (default: the machine's)")
         ->type_name("MB");

@@ -39,12 +39,13 @@ void printHelp(const CLI::App& app, const HelpText& help) {
     std::ostream& out = std::cout;
     out << "Usage: " << help.usage << "\n\n" << wrapText(help.summary, kHelpWidth, 0) << "\n";
     for (const std::string& group : app.get_groups()) {
-        const auto options =
-            app.get_options([&](const CLI::Option* option) { return option->get_group() == group; });
+        const auto options = app.get_options(
+            [&](const CLI::Option* option) { return option->get_group() == group; });
         if (options.empty()) continue;
         out << "\n" << group << ":\n";
         for (const CLI::Option* option : options) {
-            std::string name = option->get_positional() ? option->get_name() : option->get_name(false, true);
+            std::string name =
+                option->get_positional() ? option->get_name() : option->get_name(false, true);
             std::replace(name.begin(), name.end(), ',', ' ');
             if (!option->get_positional() && !option->get_type_name().empty()) {
                 name += " " + option->get_type_name();
@@ -67,14 +68,16 @@ Error unexpectedArgument(const CLI::App& app, const std::string& argument) {
         for (const std::string& known : option->get_lnames()) names.push_back("--" + known);
     }
     const std::string nearest = nearestName(name, names);
-    return Error(ErrorCode::kInvalidArgument, "",
-                 "unknown option '" + name + "'" +
-                     (nearest.empty() ? "; --help lists them" : "; did you mean '" + nearest + "'?"));
+    return Error(
+        ErrorCode::kInvalidArgument, "",
+        "unknown option '" + name + "'" +
+            (nearest.empty() ? "; --help lists them" : "; did you mean '" + nearest + "'?"));
 }
 
 }  // namespace
 
-bool parseArguments(CLI::App& app, const HelpText& help, const std::vector<std::string>& arguments) {
+bool parseArguments(CLI::App& app, const HelpText& help,
+                    const std::vector<std::string>& arguments) {
     app.set_help_flag("-h,--help", "print this text");
     try {
         std::vector<std::string> last_first(arguments.rbegin(), arguments.rend());
@@ -88,7 +91,8 @@ bool parseArguments(CLI::App& app, const HelpText& help, const std::vector<std::
         if (!unexpected.empty()) throw unexpectedArgument(app, unexpected[0]);
         const std::string message = error.what();
         if (dynamic_cast<const CLI::ArgumentMismatch*>(&error)) {
-            throw Error(ErrorCode::kInvalidArgument, message.substr(0, message.find(':')), "takes exactly one value");
+            throw Error(ErrorCode::kInvalidArgument, message.substr(0, message.find(':')),
+                        "takes exactly one value");
         }
         throw Error(ErrorCode::kInvalidArgument, "", message);
     }
@@ -104,7 +108,8 @@ void SettingOptions::addTo(CLI::App& app) {
                            ->type_name(isChoice(info) ? info.values : "N")
                            ->group("Settings");
     }
-    app.add_option("--set", sets_, "any setting by its name; 'stipple help settings' lists them; repeatable")
+    app.add_option("--set", sets_,
+                   "any setting by its name; 'stipple help settings' lists them; repeatable")
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false)
         ->group("Settings");
@@ -119,13 +124,15 @@ void SettingOptions::apply(RenderSettings& settings) const {
         applySetting(settings, set.substr(0, equals), set.substr(equals + 1), "--set");
     }
     for (const Given& given : given_) {
-        if (given.option->count() > 0) applySetting(settings, given.key, given.text, dashed(given.key));
+        if (given.option->count() > 0)
+            applySetting(settings, given.key, given.text, dashed(given.key));
     }
 }
 
 std::string settingsHelp() {
     std::string text =
-        "Settings, for --set KEY=VALUE and for \"render\" in a scene file. The scene file overrides\n"
+        "Settings, for --set KEY=VALUE and for \"render\" in a scene file. The scene file "
+        "overrides\n"
         "the defaults, the command line overrides the scene file.\n\n";
     for (const SettingInfo& info : settingsTable()) {
         text += helpLine(info.key, describe(info, true));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all commands share in reading their command line: parsing with CLI11, help in one layout, and the options that
-// come from the settings table.
+// What all commands share in reading their command line: parsing with CLI11, help in one layout,
+// and the options that come from the settings table.
 #pragma once
 
 #include <core/settings.h>
@@ -19,8 +19,9 @@ struct HelpText {
     std::vector<std::string> examples;  // "stipple info forest.scene.json"
 };
 
-// Fills what the app's options are bound to. Prints the help on stdout and returns false if --help is among the
-// arguments. Throws kInvalidArgument, for an unknown option with the nearest one that exists.
+// Fills what the app's options are bound to. Prints the help on stdout and returns false if --help
+// is among the arguments. Throws kInvalidArgument, for an unknown option with the nearest one that
+// exists.
 bool parseArguments(CLI::App& app, const HelpText& help, const std::vector<std::string>& arguments);
 
 // One option for each setting that has one, and --set for all of them.
@@ -43,8 +44,8 @@ private:
 // "settings table" as `stipple help settings` prints it.
 std::string settingsHelp();
 
-// Breaks text at spaces so that lines have at most `width` characters; every line but the first starts with `indent`
-// spaces.
+// Breaks text at spaces so that lines have at most `width` characters; every line but the first
+// starts with `indent` spaces.
 std::string wrapText(const std::string& text, size_t width, size_t indent);
 
 }  // namespace stipple

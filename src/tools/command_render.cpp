@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `stipple render`: check the command line, load, draw, write.
 #include <core/nearest_name.h>
+#include <core/stopwatch.h>
 #include <render/renderer.h>
 #include <scenegraph/io/load.h>
 #include <tools/command_line.h>
@@ -11,7 +12,6 @@
 #include <tools/stats_json.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <iostream>
 #include <sstream>
@@ -35,23 +35,23 @@ struct RenderOptions {
     SettingOptions settings;
 };
 
-const std::vector<std::string> kAovNames = {"depth", "normal", "albedo", "object", "coverage", "count"};
+const std::vector<std::string> kAovNames = {"depth",  "normal",   "albedo",
+                                            "object", "coverage", "count"};
 
 const HelpText kHelp = {
     "stipple render SCENE -o OUT.png|OUT.exr [options]",
-    "Draws a picture of a scene and prints its path. SCENE is a scene file (*.scene.json) or a single model (.gltf, "
-    ".glb), for which a camera and a light are made.",
+    "Draws a picture of a scene and prints its path. SCENE is a scene file (*.scene.json) or a "
+    "single model (.gltf, .glb), for which a camera and a light are made.",
     {"stipple render scenes/forest.scene.json -o forest.png --width 1920 --height 1080",
      "stipple render tree.glb -o tree.exr --aov depth,normal --samples 4 --stats tree.json"}};
 
-double secondsSince(std::chrono::steady_clock::time_point start) {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 void addOptions(CLI::App& app, RenderOptions& options) {
-    app.add_option("SCENE", options.scene, "*.scene.json, .gltf or .glb")->required()->group("Arguments");
-    app.add_option("-o,--output", options.output,
-                   "the picture: .png (sRGB, 8 bits) or .exr (linear floats); appears whole or not at all")
+    app.add_option("SCENE", options.scene, "*.scene.json, .gltf or .glb")
+        ->required()
+        ->group("Arguments");
+    app.add_option(
+           "-o,--output", options.output,
+           "the picture: .png (sRGB, 8 bits) or .exr (linear floats); appears whole or not at all")
         ->required()
         ->type_name("FILE")
         ->group("Picture");
@@ -59,15 +59,19 @@ void addOptions(CLI::App& app, RenderOptions& options) {
         ->type_name("NAME")
         ->group("Picture");
     app.add_option("--aov", options.aovs,
-                   "further channels of an .exr, separated by commas: depth, normal, albedo, object, coverage, count")
+                   "further channels of an .exr, separated by commas: depth, normal, albedo, "
+                   "object, coverage, count")
         ->type_name("NAMES")
         ->delimiter(',')
         ->allow_extra_args(false)
         ->group("Picture");
-    app.add_flag("--transparent", options.transparent, "leave the background out; alpha is coverage")->group("Picture");
+    app.add_flag("--transparent", options.transparent,
+                 "leave the background out; alpha is coverage")
+        ->group("Picture");
     options.settings.addTo(app);
-    app.add_option("--repeat", options.repeat,
-                   "draw the frame this often; --stats lists the times, the first one cold (default 1)")
+    app.add_option(
+           "--repeat", options.repeat,
+           "draw the frame this often; --stats lists the times, the first one cold (default 1)")
         ->type_name("N")
         ->check(CLI::Range(1, 100000).description(""))
         ->group("Running");
@@ -75,20 +79,24 @@ void addOptions(CLI::App& app, RenderOptions& options) {
                    "most memory that loading may take, in MB (default: the machine's)")
         ->type_name("MB")
         ->group("Running");
-    app.add_option("--debug-pixel", options.debug_pixel, "print to stderr what happens at this pixel")
+    app.add_option("--debug-pixel", options.debug_pixel,
+                   "print to stderr what happens at this pixel")
         ->type_name("X,Y")
         ->group("Running");
-    app.add_flag("--allow-outside", options.allow_outside, "let the scene's paths leave its folder")->group("Running");
+    app.add_flag("--allow-outside", options.allow_outside, "let the scene's paths leave its folder")
+        ->group("Running");
     app.add_option("--stats", options.stats, "write times, counters and memory as JSON")
         ->type_name("FILE.json")
         ->group("Running");
-    app.add_flag("-q,--quiet", options.quiet, "no progress, only warnings and errors")->group("Running");
+    app.add_flag("-q,--quiet", options.quiet, "no progress, only warnings and errors")
+        ->group("Running");
 }
 
 // Throws unless `text` is "X,Y" within the picture.
 void checkDebugPixel(const std::string& text, const RenderSettings& settings) {
     int x = 0, y = 0, length = 0;
-    if (std::sscanf(text.c_str(), "%d,%d%n", &x, &y, &length) != 2 || size_t(length) != text.size()) {
+    if (std::sscanf(text.c_str(), "%d,%d%n", &x, &y, &length) != 2 ||
+        size_t(length) != text.size()) {
         throw Error(ErrorCode::kInvalidArgument, "--debug-pixel", "'" + text + "' is not X,Y");
     }
     if (x < 0 || y < 0 || x >= settings.width || y >= settings.height) {
@@ -105,22 +113,26 @@ void checkOptions(const RenderOptions& options) {
     for (const std::string& aov : options.aovs) {
         if (std::find(kAovNames.begin(), kAovNames.end(), aov) != kAovNames.end()) continue;
         const std::string nearest = nearestName(aov, kAovNames);
-        throw Error(ErrorCode::kInvalidArgument, "--aov",
-                    "unknown channel '" + aov + "'" +
-                        (nearest.empty() ? "; --help lists them" : "; did you mean '" + nearest + "'?"));
+        throw Error(
+            ErrorCode::kInvalidArgument, "--aov",
+            "unknown channel '" + aov + "'" +
+                (nearest.empty() ? "; --help lists them" : "; did you mean '" + nearest + "'?"));
     }
     if (!options.aovs.empty() && lowerExtension(options.output) != ".exr") {
-        throw Error(ErrorCode::kInvalidArgument, "--aov", "needs an .exr output; .png holds colour only");
+        throw Error(ErrorCode::kInvalidArgument, "--aov",
+                    "needs an .exr output; .png holds colour only");
     }
     RenderSettings settings;
     options.settings.apply(settings);
-    makeView(Camera(), settings.width, settings.height, settings.subpixels);  // throws for absurd sizes
+    makeView(Camera(), settings.width, settings.height,
+             settings.subpixels);  // throws for absurd sizes
 }
 
 // Defaults, then the scene file's (which the loader has checked), then the command line's.
 RenderSettings effectiveSettings(const RenderOptions& options, const Scene& scene) {
     RenderSettings settings;
-    for (const auto& [key, value] : scene.render_defaults) applySetting(settings, key, value, scene.path);
+    for (const auto& [key, value] : scene.render_defaults)
+        applySetting(settings, key, value, scene.path);
     options.settings.apply(settings);
     return settings;
 }
@@ -131,7 +143,8 @@ const Camera& chooseCamera(const Scene& scene, const std::string& name) {
     if (const Camera* camera = scene.findCamera(name)) return *camera;
     std::string known;
     for (const Camera& camera : scene.cameras) known += (known.empty() ? "" : ", ") + camera.name;
-    throw Error(ErrorCode::kInvalidArgument, "--camera", "there is no '" + name + "'; " + scene.path + " has: " + known);
+    throw Error(ErrorCode::kInvalidArgument, "--camera",
+                "there is no '" + name + "'; " + scene.path + " has: " + known);
 }
 
 std::string joinCommand(const std::vector<std::string>& arguments) {
@@ -140,8 +153,10 @@ std::string joinCommand(const std::vector<std::string>& arguments) {
     return command;
 }
 
-// What an .exr says about how it was made.
-std::map<std::string, std::string> imageMetadata(const RunStats& stats) {
+// What an .exr says about how it was made. A .png says nothing, so that equal pictures are equal
+// files.
+std::map<std::string, std::string> imageMetadata(const RunStats& stats, const std::string& output) {
+    if (lowerExtension(output) != ".exr") return {};
     std::map<std::string, std::string> metadata = {{"stipple:version", STIPPLE_VERSION},
                                                    {"stipple:command", stats.command},
                                                    {"stipple:camera", stats.camera}};
@@ -167,7 +182,7 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
     stats.scene_path = options.scene;
 
     progress.update("load", 0.0);
-    auto start = std::chrono::steady_clock::now();
+    const Stopwatch load_watch;
     Diagnostics diagnostics;
     RenderSettings command_line_settings;
     options.settings.apply(command_line_settings);
@@ -175,7 +190,7 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
     const LoadOptions load_options = {options.allow_outside, options.memory_limit_mb, &cancel};
     const Scene scene = loadScene(options.scene, load_options, load_pool, diagnostics);
     throwIfCancelled(cancel);
-    stats.load_seconds = secondsSince(start);
+    stats.load_seconds = load_watch.seconds();
     progress.finish();
     for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
 
@@ -186,17 +201,19 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
     request.aovs = options.aovs;
     request.debug_pixel = options.debug_pixel;
     request.cancel = &cancel;
-    request.progress = [&](const char* phase, double fraction) { progress.update(phase, fraction); };
+    request.progress = [&](const char* phase, double fraction) {
+        progress.update(phase, fraction);
+    };
     if (!options.debug_pixel.empty()) checkDebugPixel(options.debug_pixel, request.settings);
     stats.settings = request.settings;
     stats.camera = request.camera.name;
     stats.scene = sceneSize(scene);
     stats.warnings = diagnostics.warnings;
 
-    start = std::chrono::steady_clock::now();
+    const Stopwatch build_watch;
     ThreadPool pool(request.settings.threads);
     Renderer renderer(scene, pool);
-    stats.build_seconds = secondsSince(start);
+    stats.build_seconds = build_watch.seconds();
     Frame frame;
     for (int i = 0; i < options.repeat; ++i) {
         frame = renderer.render(request);
@@ -205,9 +222,9 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
     }
 
     progress.update("write", 0.0);
-    start = std::chrono::steady_clock::now();
-    saveImage(frame.image, options.output, imageMetadata(stats));
-    stats.write_seconds = secondsSince(start);
+    const Stopwatch write_watch;
+    saveImage(frame.image, options.output, imageMetadata(stats, options.output));
+    stats.write_seconds = write_watch.seconds();
     if (!options.stats.empty()) saveFile(options.stats, statsJson(stats));
     progress.finish();
     std::cout << options.output << "\n";

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The commands of `stipple`: one function and one file each. They take the arguments behind the command's name, print
-// results on stdout, throw Error for all that goes wrong, and return what the shell shall see.
+// The commands of `stipple`: one function and one file each. They take the arguments behind the
+// command's name, print results on stdout, throw Error for all that goes wrong, and return what the
+// shell shall see.
 #pragma once
 
 #include <tools/exit_code.h>
@@ -26,7 +27,8 @@ const std::vector<Command>& commandTable();
 // Throws kInvalidArgument naming the nearest command.
 const Command& findCommand(const std::string& name);
 
-// Prints "stipple: message" as one line on stderr, whatever a file name or a library has put into it.
+// Prints "stipple: message" as one line on stderr, whatever a file name or a library has put into
+// it.
 void printMessage(std::string message);
 
 // The few lines that `stipple` alone and `stipple help` print.

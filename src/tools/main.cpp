@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Entry point of the `stipple` program: finds the command, turns errors into one line on stderr and an exit code.
+// Entry point of the `stipple` program: finds the command, turns errors into one line on stderr and
+// an exit code.
 #include <core/nearest_name.h>
 #include <tools/commands.h>
 
@@ -12,15 +13,19 @@ namespace stipple {
 
 ExitCode exitCodeOf(ErrorCode code) {
     switch (code) {
-        case ErrorCode::kInvalidArgument: return ExitCode::kUsage;
+        case ErrorCode::kInvalidArgument:
+            return ExitCode::kUsage;
         case ErrorCode::kFileNotFound:
         case ErrorCode::kParse:
         case ErrorCode::kInvalidScene:
-        case ErrorCode::kUnsupported: return ExitCode::kInput;
-        case ErrorCode::kCancelled: return ExitCode::kInterrupted;
+        case ErrorCode::kUnsupported:
+            return ExitCode::kInput;
+        case ErrorCode::kCancelled:
+            return ExitCode::kInterrupted;
         case ErrorCode::kOutOfMemory:
         case ErrorCode::kIo:
-        case ErrorCode::kInternal: break;
+        case ErrorCode::kInternal:
+            break;
     }
     return ExitCode::kFailed;
 }
@@ -43,16 +48,17 @@ const Command& findCommand(const std::string& name) {
         names.push_back(command.name);
     }
     const std::string nearest = nearestName(name, names);
-    throw Error(ErrorCode::kInvalidArgument, "",
-                "unknown command '" + name + "'" +
-                    (nearest.empty() ? "; try 'stipple help'"
-                                     : "; did you mean '" + nearest + "'?"));
+    throw Error(
+        ErrorCode::kInvalidArgument, "",
+        "unknown command '" + name + "'" +
+            (nearest.empty() ? "; try 'stipple help'" : "; did you mean '" + nearest + "'?"));
 }
 
 std::string shortUsage() {
     std::string text = "Usage: stipple COMMAND ...\n\nCommands:\n";
     for (const Command& command : commandTable()) {
-        text += "  " + command.name + std::string(10 - command.name.size(), ' ') + command.summary + "\n";
+        text += "  " + command.name + std::string(10 - command.name.size(), ' ') + command.summary +
+                "\n";
     }
     return text + "\n'stipple help COMMAND' or 'stipple COMMAND --help' says more.\n";
 }

@@ -21,10 +21,12 @@ std::string lowerExtension(const std::string& path) {
 
 void checkOutputFile(const std::string& option, const std::string& path,
                      const std::vector<std::string>& extensions) {
-    const bool known = std::find(extensions.begin(), extensions.end(), lowerExtension(path)) != extensions.end();
+    const bool known =
+        std::find(extensions.begin(), extensions.end(), lowerExtension(path)) != extensions.end();
     if (!extensions.empty() && !known) {
         std::string list;
-        for (const std::string& extension : extensions) list += (list.empty() ? "" : " or ") + extension;
+        for (const std::string& extension : extensions)
+            list += (list.empty() ? "" : " or ") + extension;
         throw Error(ErrorCode::kInvalidArgument, option, "'" + path + "' must end in " + list);
     }
     std::error_code error;
@@ -36,7 +38,8 @@ void checkOutputFile(const std::string& option, const std::string& path,
     if (access(folder.c_str(), W_OK | X_OK) != 0) {
         throw Error(ErrorCode::kIo, path, "cannot write to the folder '" + folder.string() + "'");
     }
-    // Files are written beside their place and then renamed, which would replace a device or a pipe.
+    // Files are written beside their place and then renamed, which would replace a device or a
+    // pipe.
     if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
         throw Error(ErrorCode::kIo, path, "exists and is not a regular file");
     }

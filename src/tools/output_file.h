@@ -7,8 +7,9 @@
 
 namespace stipple {
 
-// Throws kInvalidArgument if the path's extension is none of `extensions` (".png"; empty: any), kIo if its folder is
-// missing or not writable, or the path names something that is not a regular file. option: "-o", for messages.
+// Throws kInvalidArgument if the path's extension is none of `extensions` (".png"; empty: any), kIo
+// if its folder is missing or not writable, or the path names something that is not a regular file.
+// option: "-o", for messages.
 void checkOutputFile(const std::string& option, const std::string& path,
                      const std::vector<std::string>& extensions);
 

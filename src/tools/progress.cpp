@@ -17,7 +17,9 @@ constexpr char kClearLine[] = "\r\x1b[K";
 }  // namespace
 
 Progress::Progress(bool quiet)
-    : style_(quiet ? Style::kNone : isatty(STDERR_FILENO) ? Style::kBar : Style::kLines) {}
+    : style_(quiet                   ? Style::kNone
+             : isatty(STDERR_FILENO) ? Style::kBar
+                                     : Style::kLines) {}
 
 Progress::~Progress() {
     if (style_ == Style::kBar && !phase_.empty()) std::fputs(kClearLine, stderr);
@@ -34,7 +36,8 @@ void Progress::update(const std::string& phase, double fraction) {
     }
     if (style_ != Style::kBar || now < next_draw_) return;
     next_draw_ = now + kRedrawInterval;
-    drawBar(std::clamp(fraction, 0.0, 1.0), std::chrono::duration<double>(now - phase_start_).count());
+    drawBar(std::clamp(fraction, 0.0, 1.0),
+            std::chrono::duration<double>(now - phase_start_).count());
 }
 
 void Progress::finish() {
@@ -47,8 +50,9 @@ void Progress::finish() {
 
 void Progress::drawBar(double fraction, double seconds) {
     const int filled = int(fraction * kBarWidth);
-    std::fprintf(stderr, "%s%-12s [%s%s] %3d %%", kClearLine, phase_.c_str(), std::string(filled, '#').c_str(),
-                 std::string(kBarWidth - filled, ' ').c_str(), int(fraction * 100));
+    std::fprintf(stderr, "%s%-12s [%s%s] %3d %%", kClearLine, phase_.c_str(),
+                 std::string(filled, '#').c_str(), std::string(kBarWidth - filled, ' ').c_str(),
+                 int(fraction * 100));
     // A guess from the first percents, or the first moments, would only jump about.
     if (fraction > 0.02 && seconds > 0.5) {
         std::fprintf(stderr, "  %.0f s left", seconds / fraction * (1.0 - fraction));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Progress on stderr: a bar with the time left where stderr is a terminal, else one line for each phase that ended.
+// Progress on stderr: a bar with the time left where stderr is a terminal, else one line for each
+// phase that ended.
 #pragma once
 
 #include <chrono>
@@ -14,7 +15,8 @@ public:
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;
 
-    // fraction: of this phase, 0..1. Another name than before ends the phase before. Cheap enough for every tile.
+    // fraction: of this phase, 0..1. Another name than before ends the phase before. Cheap enough
+    // for every tile.
     void update(const std::string& phase, double fraction);
     // Ends the phase.
     void finish();

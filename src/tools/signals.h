@@ -6,7 +6,8 @@
 
 namespace stipple {
 
-// Installs handlers, once, and returns the flag they raise. A second signal of the same kind ends the process at once.
+// Installs handlers, once, and returns the flag they raise. A second signal of the same kind ends
+// the process at once.
 const CancelFlag& cancelOnSignals();
 
 // Throws Error(kCancelled) if the flag is raised.

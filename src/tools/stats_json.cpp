@@ -16,10 +16,14 @@ constexpr int kSchema = 1;
 
 Json phasesJson(const RunStats& stats) {
     // Every phase is always there, so that readers need no special cases; new ones go to the end.
-    std::vector<std::pair<std::string, double>> phases = {
-        {"load", stats.load_seconds}, {"build", stats.build_seconds}, {"plan", 0.0},
-        {"draw", 0.0},                {"raster", 0.0},                {"reconstruct", 0.0},
-        {"shade", 0.0},               {"write", stats.write_seconds}};
+    std::vector<std::pair<std::string, double>> phases = {{"load", stats.load_seconds},
+                                                          {"build", stats.build_seconds},
+                                                          {"plan", 0.0},
+                                                          {"draw", 0.0},
+                                                          {"raster", 0.0},
+                                                          {"reconstruct", 0.0},
+                                                          {"shade", 0.0},
+                                                          {"write", stats.write_seconds}};
     for (const FrameStats& frame : stats.frames) {
         for (const auto& [name, seconds] : frame.phases) {
             size_t i = 0;
@@ -49,7 +53,8 @@ Json settingsJson(const RenderSettings& settings) {
 }  // namespace
 
 size_t peakMemoryBytes() {
-    // why: getrusage also remembers what this process was before exec, which may be a large script's interpreter.
+    // why: getrusage also remembers what this process was before exec, which may be a large
+    // script's interpreter.
     std::ifstream status("/proc/self/status");
     for (std::string word; status >> word;) {
         size_t kilobytes = 0;
@@ -76,12 +81,10 @@ std::string statsJson(const RunStats& stats) {
                      {"instance_bytes", stats.scene.instance_bytes}};
     json["settings"] = settingsJson(stats.settings);
     json["phases"] = phasesJson(stats);
-    json["counters"] = {{"points_drawn", frame.points_drawn},
-                        {"points_kept", frame.points_kept},
-                        {"points_culled", frame.points_culled},
-                        {"batches", frame.batches},
-                        {"large_triangles", frame.large_triangles},
-                        {"overestimation", frame.overestimation}};
+    json["counters"] = {
+        {"points_drawn", frame.points_drawn},       {"points_kept", frame.points_kept},
+        {"points_culled", frame.points_culled},     {"batches", frame.batches},
+        {"large_triangles", frame.large_triangles}, {"overestimation", frame.overestimation}};
     json["memory"] = {{"peak_bytes", peakMemoryBytes()}, {"cache_bytes", frame.cache_bytes}};
     json["frames"] = Json::array();
     for (const FrameStats& f : stats.frames) json["frames"].push_back(f.seconds);

@@ -280,12 +280,24 @@ case_same_bits_for_any_threads() {
     cmp 1.png cached.png || fail "the cached picture differs"
 }
 
+# Waits until process $1 has a handler for SIGTERM: before, a signal says nothing about the program.
+wait_for_handler() {
+    local caught=0
+    for ((i = 0; i < 600; ++i)); do
+        caught=$(sed -n 's/^SigCgt:\t//p' "/proc/$1/status" 2>/dev/null)
+        (((0x${caught:-0} >> 14) & 1)) && return
+        sleep 0.1
+    done
+    fail "it catches no signals"
+}
+
 # interrupt SIGNAL SECONDS ARGUMENTS...: expects exit code 6 and no picture.
 interrupt() {
     local signal=$1 seconds=$2
     shift 2
     "$stipple" "$@" >stdout.txt 2>stderr.txt &
     local pid=$!
+    wait_for_handler $pid
     sleep "$seconds"
     kill "-$signal" $pid || fail "it ended before it was interrupted"
     wait $pid
@@ -355,5 +367,6 @@ case_generate() {
     expect_error 2 '1000\.\.2000000' generate tree --count 3 -o a.glb
 }
 
+declare -F "case_$3" >/dev/null || fail "there is no case $3"
 "case_$3"
 echo "passed"

@@ -56,7 +56,8 @@ TEST(CoreSettings, entriesChangeOneValueEach) {
 }
 
 TEST(CoreSettings, refusesWhatIsOutOfRangeOrNoNumber) {
-    for (const char* value : {"0", "65537", "-1", "", "12px", "1.5", " 12", "1e3", "99999999999999999999"}) {
+    for (const char* value :
+         {"0", "65537", "-1", "", "12px", "1.5", " 12", "1e3", "99999999999999999999"}) {
         EXPECT_NE(errorOf("width", value), "") << value;
     }
     for (const char* value : {"0", "nan", "inf", "-1", "1e400", "1,5", "0x10"}) {

@@ -114,7 +114,7 @@ TEST(IoGltfInvalid, refusesExponentiallyManyNodes) {
     b.json["nodes"] = Json::array();
     for (int i = 0; i < 40; ++i) b.json["nodes"].push_back({{"children", {i + 1, i + 1}}});
     b.json["nodes"].push_back(Json::object());
-    EXPECT_NE(errorOf(b).find("more than 10^7 nodes"), std::string::npos);
+    EXPECT_NE(errorOf(b).find("more than 10^6 nodes"), std::string::npos);
 }
 
 TEST(IoGltfInvalid, walksLongChainsOfNodesWithoutOverflowingTheStack) {
@@ -161,8 +161,8 @@ TEST(IoGltfInvalid, keepsFilesInsideTheFolder) {
     folder.write("secret.bin", b.bin);
     std::filesystem::create_directories(folder.path("scene"));
     std::filesystem::create_symlink(folder.path("secret.bin"), folder.path("scene/link.bin"));
-    for (const std::string uri : {std::string("../secret.bin"), std::string("%2e%2e/secret.bin"), folder.path("secret.bin"),
-                                  std::string("link.bin"), std::string("x/../../secret.bin")}) {
+    for (const std::string& uri : {std::string("../secret.bin"), std::string("%2e%2e/secret.bin"), folder.path("secret.bin"),
+                                   std::string("link.bin"), std::string("x/../../secret.bin")}) {
         b.json["buffers"] = {{{"byteLength", b.bin.size()}, {"uri", uri}}};
         const std::string path = folder.write("scene/t.gltf", b.gltf());
         const Loaded refused = tryLoad(path);

@@ -24,7 +24,7 @@ TEST(IoJson, readsAllKindsOfValues) {
 TEST(IoJson, namesLineAndColumnOfASyntaxError) {
     EXPECT_TRUE(parseError("{\n  \"a\": 1,\n  \"b\" 2\n}").starts_with("f: line 3, column 7: not valid JSON: syntax error"));
     EXPECT_TRUE(parseError("").starts_with("f: line 1, column 1: "));
-    EXPECT_NE(parseError("[1e999]").find("out of range"), std::string::npos);
+    EXPECT_NE(parseError("[1e999]").find("overflow"), std::string::npos);
     EXPECT_NE(parseError("{} x"), "");
 }
 

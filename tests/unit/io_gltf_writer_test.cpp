@@ -11,12 +11,13 @@
 namespace stipple {
 namespace {
 
-class GltfWriter : public testing::Test {
+class IoGltfWriter : public testing::Test {
 protected:
     std::string path(const std::string& name) const { return (folder_ / name).string(); }
     void SetUp() override {
         const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-        folder_ = std::filesystem::path(testing::TempDir()) / (std::string("stipple_gltf_writer_") + info->name());
+        folder_ = std::filesystem::path(testing::TempDir()) /
+                  (std::string("stipple_gltf_writer_") + info->name());
         std::filesystem::create_directories(folder_);
     }
     void TearDown() override { std::filesystem::remove_all(folder_); }
@@ -25,7 +26,7 @@ private:
     std::filesystem::path folder_;
 };
 
-TEST_F(GltfWriter, treeComesBackAsItWas) {
+TEST_F(IoGltfWriter, treeComesBackAsItWas) {
     TreeParams params;
     params.triangles = 2000;
     const GeneratedMesh tree = makeTree(params);
@@ -52,11 +53,12 @@ TEST_F(GltfWriter, treeComesBackAsItWas) {
         EXPECT_EQ(scene.materials[i].name, expected.name);
         EXPECT_EQ(scene.materials[i].double_sided, expected.double_sided);
         EXPECT_NEAR(scene.materials[i].shininess, expected.shininess, 1e-3f * expected.shininess);
-        for (int c = 0; c < 3; ++c) EXPECT_NEAR(scene.materials[i].base_color[c], expected.base_color[c], 1e-6f);
+        for (int c = 0; c < 3; ++c)
+            EXPECT_NEAR(scene.materials[i].base_color[c], expected.base_color[c], 1e-6f);
     }
 }
 
-TEST_F(GltfWriter, refusesAnEmptyMeshAndAMissingFolder) {
+TEST_F(IoGltfWriter, refusesAnEmptyMeshAndAMissingFolder) {
     EXPECT_THROW(saveGlb(path("empty.glb"), Mesh(), {}), Error);
     EXPECT_FALSE(std::filesystem::exists(path("empty.glb")));
     const GeneratedMesh box = makePrimitive("box", 12, Vec3(0.5f));

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <reconstruct/footprint.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+namespace stipple {
+
+namespace {
+
+Footprint makeFootprint(float width, float k) {
+    Footprint footprint;
+    const float density = balancedDensity(width);
+    if (k < density) {
+        // Too few points for footprints of one subpixel.
+        const float at_one = std::max(0.0f, width - 0.6f) / (width + 8.5f);
+        footprint.wide_share =
+            std::min(1.0f, at_one * (density - k) / std::max(density - 1.0f, 1e-3f));
+        return footprint;
+    }
+    // k side^2 = balancedDensity(width / side); the left side grows with the side, the right side
+    // falls.
+    float low = 0.0f, high = 1.0f;
+    for (int i = 0; i < 20; ++i) {
+        const float side = 0.5f * (low + high);
+        (k * side * side < balancedDensity(width / std::max(side, 1e-6f)) ? low : high) = side;
+    }
+    footprint.half_side = 0.5f * high;
+    return footprint;
+}
+
+}  // namespace
+
+float balancedDensity(float width) {
+    return 1.0f + 0.6f * std::log1p(0.45f * width) + 0.25f * std::max(0.0f, width - 16.0f);
+}
+
+FootprintTable::FootprintTable(float k) {
+    for (int i = 0; i < kOctaves * kPerOctave; ++i) {
+        const float width = std::ldexp(1.0f + (float(i % kPerOctave) + 0.5f) / kPerOctave,
+                                       kFirstExponent + i / kPerOctave);
+        table_[size_t(i)] = makeFootprint(width, k);
+    }
+}
+
+const Footprint& FootprintTable::of(float width) const {
+    // Exponent and the first three bits of the mantissa.
+    const int bits = int(std::bit_cast<uint32_t>(width) >> 20) - ((127 + kFirstExponent) << 3);
+    return table_[size_t(std::clamp(bits, 0, kOctaves * kPerOctave - 1))];
+}
+
+}  // namespace stipple
