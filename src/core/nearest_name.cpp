@@ -35,7 +35,7 @@ std::string nearestName(const std::string& name, const std::vector<std::string>&
         const size_t longer = std::max(name.size(), candidate.size());
         if (longer > kLongestName) continue;
         const size_t distance = editDistance(name, candidate);
-        if (distance < best_distance && 3 * distance <= longer) {
+        if (distance < best_distance && 5 * distance <= 2 * longer) {
             best = candidate;
             best_distance = distance;
         }

@@ -7,8 +7,8 @@
 
 namespace stipple {
 
-// The candidate with the smallest edit distance to `name`, "" if none comes near (more than a third
-// of the longer name would have to change). O(candidates x length^2).
+// The candidate with the smallest edit distance to `name`, "" if none comes near (more than two
+// fifths of the longer name would have to change). O(candidates x length^2).
 std::string nearestName(const std::string& name, const std::vector<std::string>& candidates);
 
 }  // namespace stipple

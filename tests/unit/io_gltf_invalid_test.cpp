@@ -241,6 +241,36 @@ TEST(IoGltfInvalid, flippedBytesLoadOrAreRefusedWithOneLine) {
     }
 }
 
+TEST(IoGltfInvalid, everyValueMayBeReplacedByAnother) {
+    GltfBuilder b = GltfBuilder::triangle();
+    b.primitive()["attributes"]["NORMAL"] = b.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
+    b.primitive()["material"] = 0;
+    b.json["materials"] = {{{"alphaMode", "MASK"},
+                            {"emissiveFactor", {0, 0, 1}},
+                            {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 2}}}}},
+                            {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 1}}, {"roughnessFactor", 0.5}}}}};
+    const int at = b.addView<uint8_t>({1}), values = b.addView<float>({5, 6, 7});
+    b.json["accessors"][0]["sparse"] = {{"count", 1},
+                                        {"indices", {{"bufferView", at}, {"componentType", 5121}}},
+                                        {"values", {{"bufferView", values}}}};
+    b.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 1}}}}};
+    b.json["nodes"].push_back({{"camera", 0}, {"rotation", {0, 0, 0, 1}}, {"scale", {1, 2, 3}}});
+    b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = b.addFloats({1, 0, 0, 2, 0, 0}, "VEC3");
+    b.json["scenes"][0]["nodes"].push_back(1);
+    const TempFolder folder;
+    LoadOptions options;
+    options.memory_limit_mb = 200;
+    int loaded_count = 0;
+    ASSERT_EQ(tryLoad(folder.write("t.gltf", b.gltf())).error, "");
+    forEachOddity(Json::parse(b.gltf()), [&](const Json& changed) {
+        const Loaded loaded = tryLoad(folder.write("t.gltf", changed.dump()), options);
+        EXPECT_EQ(loaded.error.find('\n'), std::string::npos) << loaded.error;
+        EXPECT_TRUE(loaded.error.empty() || loaded.code != ErrorCode::kInternal) << loaded.error;
+        loaded_count += loaded.error.empty();
+    });
+    EXPECT_GT(loaded_count, 50);
+}
+
 TEST(IoGltfInvalid, everyFileOfTheTestDataLoadsOrIsRefusedWithOneLine) {
     const std::string folder = testDataFolder();
     if (folder.empty()) GTEST_SKIP() << "no test data (STIPPLE_TEST_DATA)";

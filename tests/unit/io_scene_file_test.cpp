@@ -313,6 +313,48 @@ TEST(IoSceneFile, everyPrefixIsRefusedWithOneLine) {
     }
 }
 
+TEST(IoSceneFile, everyValueMayBeReplacedByAnother) {
+    const Json scene = Json::parse(R"({
+        "version": 1,
+        "assets": {"ball": {"generate": "sphere", "triangles": 20, "color": [1, 0.5, 0]},
+                   "hill": {"generate": "terrain", "seed": 1, "size": 60, "resolution": 5, "relief": 6, "feature_size": 20, "style": "meadow"},
+                   "oak": {"generate": "tree", "species": "birch", "seed": 3, "height": 6, "triangles": 300},
+                   "tuft": {"generate": "grass", "seed": 1, "height": 0.2, "radius": 0.1, "blades": 3},
+                   "rock": {"generate": "rock", "seed": 1, "radius": 1, "subdivisions": 1}},
+        "groups": {
+            "wood": {"scatter": {"on": "hill", "items": [{"child": "oak", "weight": 2}, {"child": "tuft"}], "count": 20, "size": 50,
+                "center": [1, 2], "min_slope": 0, "max_slope": 40, "min_height": -9, "max_height": 9, "min_scale": 0.5, "max_scale": 2,
+                "tilt": 5, "align": 0.3, "sink": 0.1, "clustering": 0.5, "seed": 4}},
+            "all": {"instances": [{"child": "hill"}, {"child": "wood"},
+                {"child": "ball", "translation": [1, 2, 3], "rotation": [10, 20, 30], "scale": [1, 2, 3]},
+                {"child": "rock", "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]}],
+                "grid": {"child": "wood", "count_x": 3, "count_z": 2, "spacing_x": 60, "spacing_z": 60, "jitter": 2, "any_turn": true,
+                "quarter_turns": false, "min_scale": 0.5, "max_scale": 2, "hill_height": 3, "hill_size": 100, "seed": 1}}},
+        "root": "all",
+        "cameras": [{"name": "a", "eye": [0, 5, 20], "target": [0, 0, 0], "up": [0, 1, 0], "fov": 50, "near": 1, "far": 99},
+                    {"name": "b", "eye": [0, 50, 0], "direction": [0, -1, 0], "orthographic": 40}],
+        "lights": {"suns": [{"direction": [1, 2, 1], "irradiance": [3, 3, 3]}]},
+        "background": {"zenith": [0.2, 0.4, 0.8], "haze_distance": 500},
+        "exposure": 0.5,
+        "render": {"samples": 2}})");
+    const TempFolder folder;
+    LoadOptions options;
+    options.memory_limit_mb = 20;
+    int loaded_count = 0;
+    ASSERT_EQ(tryLoad(folder.write("s.scene.json", scene.dump()), options).error, "");
+    forEachOddity(scene, [&](const Json& changed) {
+        const Loaded loaded = tryLoad(folder.write("s.scene.json", changed.dump()), options);
+        EXPECT_EQ(loaded.error.find('\n'), std::string::npos) << loaded.error;
+        EXPECT_TRUE(loaded.error.empty() || loaded.code != ErrorCode::kInternal) << loaded.error;
+        EXPECT_TRUE(loaded.error.empty() || loaded.error.starts_with("s.scene.json: ")) << loaded.error;
+        loaded_count += loaded.error.empty();
+        if (loaded.error.empty() && !sceneBounds(loaded.scene).isEmpty()) {
+            EXPECT_TRUE(isFinite(sceneBounds(loaded.scene).extent())) << changed.dump();
+        }
+    });
+    EXPECT_GT(loaded_count, 100);
+}
+
 TEST(IoSceneFile, theSameFileGivesTheSameScene) {
     Json s = minimal();
     s["groups"]["all"]["scatter"] = Json::parse(R"({"items": [{"child": "ball"}], "count": 100, "seed": 5})");

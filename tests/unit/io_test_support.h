@@ -5,6 +5,7 @@
 #include <scenegraph/io/json.h>
 #include <scenegraph/io/load.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -132,6 +133,27 @@ inline Loaded tryLoad(const std::string& path, LoadOptions options = {}) {
 inline Loaded tryLoadText(const std::string& name, const std::string& bytes, LoadOptions options = {}) {
     const TempFolder folder;
     return tryLoad(folder.write(name, bytes), options);
+}
+
+// Calls visit(changed) for the document with every one of its values, in turn, replaced by values that are wrong in some way or odd.
+template <class Visit>
+void forEachOddity(const Json& document, const Visit& visit) {
+    static const Json kOdd = Json::parse(
+        R"([null, true, "", "all", "\n\u0000x", -1, 0, 1, 2.5, 3, 255, 1e-30, -1e9, 1e9, 1e308, 4294967296, 18446744073709551615, [], {}, [0, 0, 0], [[]]])");
+    const Json flat = document.flatten();
+    std::vector<Json::json_pointer> places;
+    for (const auto& [pointer, unused] : flat.items()) {
+        for (Json::json_pointer p(pointer); !p.empty(); p = p.parent_pointer()) places.push_back(p);
+    }
+    std::sort(places.begin(), places.end());
+    places.erase(std::unique(places.begin(), places.end()), places.end());
+    for (const Json::json_pointer& place : places) {
+        for (const Json& odd : kOdd) {
+            Json changed = document;
+            changed[place] = odd;
+            visit(changed);
+        }
+    }
 }
 
 // The folder of real models, empty if there is none.
