@@ -44,9 +44,18 @@ public:
                   x1 = std::min(rect.x1, rect_.x1) - rect_.x0;
         const int y0 = std::max(rect.y0, rect_.y0) - rect_.y0,
                   y1 = std::min(rect.y1, rect_.y1) - rect_.y0;
-        for (int by = y0 / kHiddenBlock; by * kHiddenBlock < y1; ++by) {
-            for (int bx = x0 / kHiddenBlock; bx * kHiddenBlock < x1; ++bx) {
-                if (!(farthest_[size_t(by) * size_t(blocks_x_) + size_t(bx)] < z_min)) return false;
+        bool is_hidden = true;
+        for (int by = y0 / kHiddenBlock; by * kHiddenBlock < y1 && is_hidden; ++by) {
+            for (int bx = x0 / kHiddenBlock; bx * kHiddenBlock < x1 && is_hidden; ++bx) {
+                is_hidden = farthest_[size_t(by) * size_t(blocks_x_) + size_t(bx)] < z_min;
+            }
+        }
+        if (is_hidden || int64_t(x1 - x0) * (y1 - y0) > kSmallRect) return is_hidden;
+        // From the top, where what is far shows first.
+        for (int y = y0; y < y1; ++y) {
+            const uint64_t* keys = keys_.data() + size_t(y) * size_t(stride());
+            for (int x = x0; x < x1; ++x) {
+                if (!(depthOf(keys[x]) < z_min)) return false;
             }
         }
         return true;
@@ -56,6 +65,7 @@ public:
 
 private:
     static constexpr int kHiddenBlock = 16;
+    static constexpr int64_t kSmallRect = 4096;  // subpixels
 
     SubpixelRect rect_;
     std::vector<uint64_t> keys_;

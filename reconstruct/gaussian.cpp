@@ -57,11 +57,13 @@ public:
     }
     const SubpixelRect& region() const override { return tile_.rect(); }
 
-    void take(const PointBlock& block) override {
-        pass_ == 0 ? depth_pass_.take(block, tile_) : average(block);
+    bool take(const PointBlock& block) override {
+        if (pass_ == 0) return depth_pass_.take(block, tile_);
+        average(block);
+        return false;
     }
-    void take(const TriangleBlock& block) override {
-        if (pass_ == 0) depth_pass_.take(block, tile_);
+    bool take(const TriangleBlock& block) override {
+        return pass_ == 0 && depth_pass_.take(block, tile_);
     }
 
     void endTile(const SampleLookup& lookup) override {

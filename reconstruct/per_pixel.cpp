@@ -24,7 +24,7 @@ void DepthPass::begin(const SubpixelRect& inner, DepthTile&) {
     }
 }
 
-void DepthPass::take(const PointBlock& block, DepthTile& tile) {
+bool DepthPass::take(const PointBlock& block, DepthTile& tile) {
     const View& view = context_.view;
     const float focal = float(view.focal), cx = float(view.center_x), cy = float(view.center_y);
     const SubpixelRect& rect = tile.rect();
@@ -50,6 +50,7 @@ void DepthPass::take(const PointBlock& block, DepthTile& tile) {
         for (int s = 0; s < block.patch_count; ++s) footprints[s] = footprints_.of(block.patch[s]);
     }
     counters_.points_drawn += uint64_t(block.count);
+    bool is_used = false;
     for (int k = 0; k < n_kept; ++k) {
         const int i = kept[k];
         const int ix = int(sx[i]), iy = int(sy[i]);
@@ -62,7 +63,7 @@ void DepthPass::take(const PointBlock& block, DepthTile& tile) {
                       size_t((ix - inner_.x0) / s)];
         }
         if (splat_subpixels_ > 0) {
-            splat(tile, sx[i], sy[i], block.z[i], number, splat_subpixels_);
+            is_used |= splat(tile, sx[i], sy[i], block.z[i], number, splat_subpixels_);
             continue;
         }
         // The same choice in every tile that sees the point: from its coordinates, not its number.
@@ -74,19 +75,24 @@ void DepthPass::take(const PointBlock& block, DepthTile& tile) {
              uniformFloat(mixBits(std::bit_cast<uint32_t>(block.x[i]) * 0x9e3779b9ull ^
                                   std::bit_cast<uint32_t>(block.y[i]))) < share);
         if (is_wide) {
-            splat(tile, sx[i], sy[i], block.z[i], number, 2);
+            is_used |= splat(tile, sx[i], sy[i], block.z[i], number, 2);
         } else if (std::abs(sx[i] - float(ix) - 0.5f) <= footprint.half_side &&
                    std::abs(sy[i] - float(iy) - 0.5f) <= footprint.half_side) {
             uint64_t& slot = tile.row(iy)[ix];
-            slot = std::min(slot, DepthTile::pack(block.z[i], number));
+            const uint64_t key = DepthTile::pack(block.z[i], number);
+            is_used |= key < slot;
+            slot = std::min(slot, key);
         }
     }
     refreshAfter(uint64_t(n_kept), tile);
+    return is_used;
 }
 
-void DepthPass::take(const TriangleBlock& block, DepthTile& tile) {
+bool DepthPass::take(const TriangleBlock& block, DepthTile& tile) {
     counters_.triangles += uint64_t(block.count);
-    refreshAfter(rasterizeTriangles(context_.view, block, tile), tile);
+    const uint64_t visited = rasterizeTriangles(context_.view, block, tile);
+    refreshAfter(visited, tile);
+    return visited > 0;
 }
 
 // What is hidden is looked at again after every half tile of subpixels.
@@ -98,17 +104,21 @@ void DepthPass::refreshAfter(uint64_t subpixels, DepthTile& tile) {
     }
 }
 
-void DepthPass::splat(DepthTile& tile, float sub_x, float sub_y, float depth, uint32_t number,
+bool DepthPass::splat(DepthTile& tile, float sub_x, float sub_y, float depth, uint32_t number,
                       int side) const {
     const SubpixelRect& rect = tile.rect();
     const float half = 0.5f * float(side - 1);
     const int x0 = int(std::floor(sub_x - half)), y0 = int(std::floor(sub_y - half));
     const uint64_t key = DepthTile::pack(depth, number);
+    bool is_used = false;
     for (int y = std::max(y0, rect.y0); y < std::min(y0 + side, rect.y1); ++y) {
         uint64_t* row = tile.row(y);
-        for (int x = std::max(x0, rect.x0); x < std::min(x0 + side, rect.x1); ++x)
+        for (int x = std::max(x0, rect.x0); x < std::min(x0 + side, rect.x1); ++x) {
+            is_used |= key < row[x];
             row[x] = std::min(row[x], key);
+        }
     }
+    return is_used;
 }
 
 uint64_t fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
@@ -169,8 +179,8 @@ public:
         return context_.settings.culling && tile_.hides(rect, z_min);
     }
     const SubpixelRect& region() const override { return tile_.rect(); }
-    void take(const PointBlock& block) override { depth_pass_.take(block, tile_); }
-    void take(const TriangleBlock& block) override { depth_pass_.take(block, tile_); }
+    bool take(const PointBlock& block) override { return depth_pass_.take(block, tile_); }
+    bool take(const TriangleBlock& block) override { return depth_pass_.take(block, tile_); }
 
     void endTile(const SampleLookup& lookup) override {
         if (context_.settings.fill) fillHoles(tile_, scratch_);

@@ -19,15 +19,16 @@ class DepthPass {
 public:
     DepthPass(const ReconstructionContext& context, int splat_subpixels);
     void begin(const SubpixelRect& inner, DepthTile& tile);
-    void take(const PointBlock& block, DepthTile& tile);
-    void take(const TriangleBlock& block, DepthTile& tile);
+    // False if none of the block is in front.
+    bool take(const PointBlock& block, DepthTile& tile);
+    bool take(const TriangleBlock& block, DepthTile& tile);
     const TileCounters& counters() const { return counters_; }
     const std::vector<uint16_t>& counts() const {
         return counts_;
     }  // kept points a pixel of the tile, if asked for
 
 private:
-    void splat(DepthTile& tile, float sub_x, float sub_y, float depth, uint32_t number,
+    bool splat(DepthTile& tile, float sub_x, float sub_y, float depth, uint32_t number,
                int side) const;
 
     void refreshAfter(uint64_t subpixels, DepthTile& tile);

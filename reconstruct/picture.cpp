@@ -3,6 +3,8 @@
 
 #include <reconstruct/shade.h>
 
+#include <cstdio>
+
 namespace stipple {
 
 namespace {
@@ -42,7 +44,21 @@ Picture::Picture(const View& view, const Lighting& lighting, const std::vector<s
       coverage_(image_.channelIndex("coverage")),
       count_(image_.channelIndex("count")) {}
 
+std::string Picture::watchedPixel() const {
+    const PixelSums& s = watched_;
+    const float n = std::max(s.covered, 1.0f);
+    const float* rgb = image_.pixel(watched_x_, watched_y_);
+    char line[512];
+    std::snprintf(line, sizeof line,
+                  "pixel %d,%d: linear RGB %.5g %.5g %.5g; %g of %g samples covered; depth mean %.6g, nearest %.6g, "
+                  "farthest %.6g; albedo %.3g %.3g %.3g; object %u; %g points",
+                  watched_x_, watched_y_, rgb[0], rgb[1], rgb[2], s.covered, s.samples, s.depth / n, s.nearest,
+                  s.depth_max, s.albedo.x / n, s.albedo.y / n, s.albedo.z / n, s.object, s.points);
+    return line;
+}
+
 void Picture::write(int x, int y, const PixelSums& s) {
+    if (x == watched_x_ && y == watched_y_) watched_ = s;
     const float coverage = s.samples > 0.0f ? s.covered / s.samples : 0.0f;
     Vec3 color = s.samples > 0.0f ? s.radiance / s.samples : Vec3(0.0f);
     if (!transparent_ && coverage < 1.0f) {

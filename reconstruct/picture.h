@@ -49,6 +49,10 @@ public:
     // Background where samples saw nothing; exposure applied. Pixels may be written in parallel.
     void write(int x, int y, const PixelSums& sums);
     Image& image() { return image_; }
+    // Keeps the sums of one pixel for the description below.
+    void watch(int x, int y) { watched_x_ = x, watched_y_ = y; }
+    // One line on what was found in the watched pixel.
+    std::string watchedPixel() const;
 
 private:
     View view_;
@@ -57,6 +61,8 @@ private:
     float exposure_;
     Image image_;
     int depth_, normal_, albedo_, object_, coverage_, count_;
+    int watched_x_ = -1, watched_y_ = -1;
+    PixelSums watched_;
 };
 
 }  // namespace stipple

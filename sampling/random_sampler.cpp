@@ -132,7 +132,8 @@ private:
             const double bound = box.bound * maxAreaScale(camera_from_group.linear);
             const double n = settings_.samples * bound * node.area;
             if (node.max_triangle_area * bound <= settings_.area_threshold &&
-                (box.size <= kTileShare * float(settings_.tile_size) || n <= kFewPoints)) {
+                (box.size <= kTileShare * float(settings_.tile_size) || n <= kFewPoints) &&
+                n <= kMostOverdraw * double(box.rect.width()) * double(box.rect.height())) {
                 samplePoints(group, ref, node_index, camera_from_group, path,
                              settings_.samples * bound, n);
                 return;
@@ -266,7 +267,7 @@ private:
             dropBackFaces(mesh, frame, run.first_index, block);
             const TriangleMask mask(*this, block.first_number, block);
             block.mask = stratum.masked ? &mask : nullptr;
-            sink_->take(block);
+            if (!sink_->take(block)) runs_.pop_back();
         }
     }
 
@@ -475,7 +476,7 @@ private:
             run.first_index = first;
             runs_.push_back(run);
             transformPoints(params, list, lane, first, block_);
-            sink_->take(block_);
+            if (!sink_->take(block_)) runs_.pop_back();
             first += n;
             count -= n;
         }

@@ -9,7 +9,7 @@ namespace stipple {
 
 namespace {
 
-constexpr uint32_t kLeafInstances = 12;
+constexpr uint32_t kLeafInstances = 20;
 
 // What a group must know of a child: a mesh or another group.
 struct ChildSums {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the nodes of a glTF file to instances. Meshes, materials and pictures are in gltf_mesh.cpp and gltf_material.cpp.
+// From the nodes of a glTF file to instances. Meshes, materials and pictures are in gltf_mesh.cpp
+// and gltf_material.cpp.
 #include <scenegraph/io/gltf.h>
 
 #include <scenegraph/io/gltf_mesh.h>
@@ -33,11 +34,14 @@ public:
 private:
     std::vector<std::pair<int, std::string>> roots() const;
     void visit(int node, const Affine& world_from_node);
-    void placeMesh(const tinygltf::Node& node, const Affine& world_from_node, const std::string& path);
+    void placeMesh(const tinygltf::Node& node, const Affine& world_from_node,
+                   const std::string& path);
     void place(ChildRef mesh, const Affine& world_from_mesh, const std::string& path);
     std::vector<Affine> gpuInstances(const tinygltf::Value& extension, const std::string& path);
-    void addCamera(const tinygltf::Node& node, const Affine& world_from_node, const std::string& path);
-    void addLight(const tinygltf::Value& extension, const Affine& world_from_node, const std::string& path);
+    void addCamera(const tinygltf::Node& node, const Affine& world_from_node,
+                   const std::string& path);
+    void addLight(const tinygltf::Value& extension, const Affine& world_from_node,
+                  const std::string& path);
 
     const GltfDocument& document_;
     Scene& scene_;
@@ -48,16 +52,21 @@ private:
     std::map<std::string, int> camera_numbers_;  // given to cameras of the same name
 };
 
-Affine nodeTransform(const GltfDocument& document, const tinygltf::Node& node, const std::string& path) {
+Affine nodeTransform(const GltfDocument& document, const tinygltf::Node& node,
+                     const std::string& path) {
     if (!node.matrix.empty()) {
         Affine result;
         if (!affineFromMatrix(node.matrix.data(), result)) {
-            document.fail(ErrorCode::kInvalidScene, path + ".matrix", "the last row is not 0 0 0 1");
+            document.fail(ErrorCode::kInvalidScene, path + ".matrix",
+                          "the last row is not 0 0 0 1");
         }
         return result;
     }
-    const DVec3 t = node.translation.empty() ? DVec3(0) : DVec3(node.translation[0], node.translation[1], node.translation[2]);
-    const DVec3 s = node.scale.empty() ? DVec3(1) : DVec3(node.scale[0], node.scale[1], node.scale[2]);
+    const DVec3 t = node.translation.empty()
+                        ? DVec3(0)
+                        : DVec3(node.translation[0], node.translation[1], node.translation[2]);
+    const DVec3 s =
+        node.scale.empty() ? DVec3(1) : DVec3(node.scale[0], node.scale[1], node.scale[2]);
     DMat3 r(1.0);
     if (!node.rotation.empty() && !rotationFromQuaternion(node.rotation.data(), r)) {
         document.fail(ErrorCode::kInvalidScene, path + ".rotation", "the quaternion is zero");
@@ -68,11 +77,13 @@ Affine nodeTransform(const GltfDocument& document, const tinygltf::Node& node, c
 std::vector<std::pair<int, std::string>> NodeWalk::roots() const {
     const tinygltf::Model& model = document_.model;
     std::vector<std::pair<int, std::string>> roots;
-    if (model.defaultScene >= 0) document_.checkIndex(model.defaultScene, model.scenes.size(), "scene", "scenes");
+    if (model.defaultScene >= 0)
+        document_.checkIndex(model.defaultScene, model.scenes.size(), "scene", "scenes");
     if (!model.scenes.empty()) {
         const size_t s = size_t(std::max(0, model.defaultScene));
         for (size_t i = 0; i < model.scenes[s].nodes.size(); ++i) {
-            roots.emplace_back(model.scenes[s].nodes[i], "scenes[" + std::to_string(s) + "].nodes[" + std::to_string(i) + "]");
+            roots.emplace_back(model.scenes[s].nodes[i], "scenes[" + std::to_string(s) +
+                                                             "].nodes[" + std::to_string(i) + "]");
         }
         return roots;
     }
@@ -98,7 +109,9 @@ std::vector<Placement> NodeWalk::run() {
     std::vector<bool> is_open(document_.model.nodes.size(), false);
     const auto push = [&](int node, const Affine& world_from_parent, const std::string& path) {
         document_.checkIndex(node, is_open.size(), path, "nodes");
-        if (is_open[node]) document_.fail(ErrorCode::kInvalidScene, path, "node " + std::to_string(node) + " contains itself");
+        if (is_open[node])
+            document_.fail(ErrorCode::kInvalidScene, path,
+                           "node " + std::to_string(node) + " contains itself");
         steps.push_back({node, world_from_parent, false});
     };
     auto root_nodes = roots();
@@ -111,13 +124,17 @@ std::vector<Placement> NodeWalk::run() {
         if (step.leaves) continue;
         const tinygltf::Node& node = document_.model.nodes[step.node];
         const std::string path = "nodes[" + std::to_string(step.node) + "]";
-        // glTF forbids nodes of several parents, files have them all the same; a few can stand for any number of nodes.
+        // glTF forbids nodes of several parents, files have them all the same; a few can stand for
+        // any number of nodes.
         if (++n_visits > is_open.size() + kMaxRepeatedNodes) {
-            document_.fail(ErrorCode::kUnsupported, path, "nodes of several parents make more than 10^6 nodes");
+            document_.fail(ErrorCode::kUnsupported, path,
+                           "nodes of several parents make more than 10^6 nodes");
         }
         if (n_visits % 4096 == 0) document_.context.throwIfCancelled();
-        const Affine world_from_node = step.world_from_parent * nodeTransform(document_, node, path);
-        if (!isFinite(world_from_node)) document_.fail(ErrorCode::kInvalidScene, path, "its transform is not finite");
+        const Affine world_from_node =
+            step.world_from_parent * nodeTransform(document_, node, path);
+        if (!isFinite(world_from_node))
+            document_.fail(ErrorCode::kInvalidScene, path, "its transform is not finite");
         visit(step.node, world_from_node);
         steps.push_back({step.node, Affine(), true});
         for (size_t i = node.children.size(); i-- > 0;) {
@@ -132,13 +149,16 @@ void NodeWalk::visit(int index, const Affine& world_from_node) {
     const std::string path = "nodes[" + std::to_string(index) + "]";
     if (node.mesh >= 0) placeMesh(node, world_from_node, path);
     if (node.camera >= 0) addCamera(node, world_from_node, path);
-    if (node.skin >= 0) document_.context.warnOnce(document_.name, "skins are ignored: meshes stay in their bind pose");
+    if (node.skin >= 0)
+        document_.context.warnOnce(document_.name,
+                                   "skins are ignored: meshes stay in their bind pose");
     if (const auto it = node.extensions.find("KHR_lights_punctual"); it != node.extensions.end()) {
         addLight(it->second, world_from_node, path);
     }
 }
 
-void NodeWalk::placeMesh(const tinygltf::Node& node, const Affine& world_from_node, const std::string& path) {
+void NodeWalk::placeMesh(const tinygltf::Node& node, const Affine& world_from_node,
+                         const std::string& path) {
     document_.checkIndex(node.mesh, document_.model.meshes.size(), path + ".mesh", "meshes");
     auto it = meshes_.find(node.mesh);
     if (it == meshes_.end()) {
@@ -158,7 +178,8 @@ void NodeWalk::placeMesh(const tinygltf::Node& node, const Affine& world_from_no
 }
 
 void NodeWalk::place(ChildRef mesh, const Affine& world_from_mesh, const std::string& path) {
-    if (!isFinite(world_from_mesh)) document_.fail(ErrorCode::kInvalidScene, path, "a transform is not finite");
+    if (!isFinite(world_from_mesh))
+        document_.fail(ErrorCode::kInvalidScene, path, "a transform is not finite");
     if (isSingular(world_from_mesh.linear)) {  // the customary way to hide something
         document_.context.warnOnce(document_.name, "what is scaled to nothing is left out");
         return;
@@ -166,55 +187,67 @@ void NodeWalk::place(ChildRef mesh, const Affine& world_from_mesh, const std::st
     placements_.push_back({mesh, world_from_mesh});
 }
 
-std::vector<Affine> NodeWalk::gpuInstances(const tinygltf::Value& extension, const std::string& path) {
+std::vector<Affine> NodeWalk::gpuInstances(const tinygltf::Value& extension,
+                                           const std::string& path) {
     const tinygltf::Value& attributes = extension.Get("attributes");
     std::map<std::string, std::vector<float>> values;
     size_t n = 0;
     bool first = true;
     constexpr std::array<std::tuple<const char*, int, int>, 3> kAttributes = {
-        {{"TRANSLATION", TINYGLTF_TYPE_VEC3, 3}, {"ROTATION", TINYGLTF_TYPE_VEC4, 4}, {"SCALE", TINYGLTF_TYPE_VEC3, 3}}};
+        {{"TRANSLATION", TINYGLTF_TYPE_VEC3, 3},
+         {"ROTATION", TINYGLTF_TYPE_VEC4, 4},
+         {"SCALE", TINYGLTF_TYPE_VEC3, 3}}};
     for (const auto& [name, type, components] : kAttributes) {
         if (!attributes.IsObject() || !attributes.Has(name)) continue;
         const std::string place = path + ".attributes." + name;
         const int accessor = attributes.Get(name).GetNumberAsInt();
         const size_t count = accessorCount(document_, accessor, {type}, place);
         if (!first && count != n) {
-            document_.fail(ErrorCode::kInvalidScene, place, "count " + std::to_string(count) + ", but others have " + std::to_string(n));
+            document_.fail(
+                ErrorCode::kInvalidScene, place,
+                "count " + std::to_string(count) + ", but others have " + std::to_string(n));
         }
         n = count, first = false;
         values[name] = readFloats(document_, accessor, components, 0.0f, place);
     }
     // The list of transforms, the list of placements, and what stays in the group.
-    document_.context.budget.take(double(n) * (2 * sizeof(Affine) + kBytesPerInstance), document_.where(path),
-                                  std::to_string(n) + " instances");
+    document_.context.budget.take(double(n) * (2 * sizeof(Affine) + kBytesPerInstance),
+                                  document_.where(path), std::to_string(n) + " instances");
     std::vector<Affine> instances;
     instances.reserve(n);
     const auto vector = [&](const char* name, size_t i, DVec3 fallback) {
         const auto it = values.find(name);
-        return it == values.end() ? fallback : DVec3(it->second[i * 3], it->second[i * 3 + 1], it->second[i * 3 + 2]);
+        return it == values.end()
+                   ? fallback
+                   : DVec3(it->second[i * 3], it->second[i * 3 + 1], it->second[i * 3 + 2]);
     };
     for (size_t i = 0; i < n; ++i) {
         if (i % 65536 == 0) document_.context.throwIfCancelled();
         DMat3 r(1.0);
         if (const auto it = values.find("ROTATION"); it != values.end()) {
-            const double q[4] = {it->second[i * 4], it->second[i * 4 + 1], it->second[i * 4 + 2], it->second[i * 4 + 3]};
+            const double q[4] = {it->second[i * 4], it->second[i * 4 + 1], it->second[i * 4 + 2],
+                                 it->second[i * 4 + 3]};
             if (!rotationFromQuaternion(q, r)) {
-                document_.fail(ErrorCode::kInvalidScene, path, "the quaternion of instance " + std::to_string(i) + " is zero");
+                document_.fail(ErrorCode::kInvalidScene, path,
+                               "the quaternion of instance " + std::to_string(i) + " is zero");
             }
         }
-        instances.push_back(affineFromParts(vector("TRANSLATION", i, DVec3(0)), r, vector("SCALE", i, DVec3(1))));
+        instances.push_back(
+            affineFromParts(vector("TRANSLATION", i, DVec3(0)), r, vector("SCALE", i, DVec3(1))));
     }
     return instances;
 }
 
-void NodeWalk::addCamera(const tinygltf::Node& node, const Affine& world_from_node, const std::string& path) {
+void NodeWalk::addCamera(const tinygltf::Node& node, const Affine& world_from_node,
+                         const std::string& path) {
     document_.checkIndex(node.camera, document_.model.cameras.size(), path + ".camera", "cameras");
     const tinygltf::Camera& source = document_.model.cameras[node.camera];
     const DVec3 forward = -world_from_node.linear[2], up = world_from_node.linear[1];
     if (isSingular(world_from_node.linear)) {
         document_.fail(ErrorCode::kInvalidScene, path, "the transform of a camera is singular");
     }
-    Camera camera = lookAt(world_from_node.translation, world_from_node.translation + glm::normalize(forward), up);
+    Camera camera = lookAt(world_from_node.translation,
+                           world_from_node.translation + glm::normalize(forward), up);
     camera.orthographic = source.type == "orthographic";
     if (camera.orthographic) {
         camera.height = 2.0 * source.orthographic.ymag;
@@ -226,39 +259,51 @@ void NodeWalk::addCamera(const tinygltf::Node& node, const Affine& world_from_no
         if (source.perspective.zfar > 0.0) camera.far_z = source.perspective.zfar;
     }
     if (!(camera.far_z > camera.near_z)) {
-        document_.fail(ErrorCode::kInvalidScene, "cameras[" + std::to_string(node.camera) + "]", "zfar <= znear");
+        document_.fail(ErrorCode::kInvalidScene, "cameras[" + std::to_string(node.camera) + "]",
+                       "zfar <= znear");
     }
-    const std::string name = !source.name.empty() ? source.name : !node.name.empty() ? node.name : "camera";
+    const std::string name = !source.name.empty() ? source.name
+                             : !node.name.empty() ? node.name
+                                                  : "camera";
     camera.name = name;
-    while (!camera_names_.insert(camera.name).second) camera.name = name + " " + std::to_string(++camera_numbers_[name] + 1);
+    while (!camera_names_.insert(camera.name).second)
+        camera.name = name + " " + std::to_string(++camera_numbers_[name] + 1);
     scene_.cameras.push_back(camera);
 }
 
-void NodeWalk::addLight(const tinygltf::Value& extension, const Affine& world_from_node, const std::string& path) {
+void NodeWalk::addLight(const tinygltf::Value& extension, const Affine& world_from_node,
+                        const std::string& path) {
     const int index = extension.Get("light").GetNumberAsInt();
-    document_.checkIndex(index, document_.model.lights.size(), path + ".extensions.KHR_lights_punctual.light", "lights");
+    document_.checkIndex(index, document_.model.lights.size(),
+                         path + ".extensions.KHR_lights_punctual.light", "lights");
     const tinygltf::Light& source = document_.model.lights[index];
     if (source.type != "directional" || isSingular(world_from_node.linear)) {
-        document_.context.warnOnce(document_.name, "lights other than directional ones are ignored");
+        document_.context.warnOnce(document_.name,
+                                   "lights other than directional ones are ignored");
         return;
     }
     Sun sun;
     sun.direction_to_light = Vec3(glm::normalize(world_from_node.linear[2]));  // it shines along -z
-    const Vec3 color = source.color.size() == 3 ? Vec3(source.color[0], source.color[1], source.color[2]) : Vec3(1.0f);
+    const Vec3 color = source.color.size() == 3
+                           ? Vec3(source.color[0], source.color[1], source.color[2])
+                           : Vec3(1.0f);
     sun.irradiance = color * float(source.intensity);
     scene_.lighting.suns.push_back(sun);
 }
 
 }  // namespace
 
-ChildRef loadGltf(const std::filesystem::path& path, const std::string& name, Scene& scene, LoadContext& context) {
+ChildRef loadGltf(const std::filesystem::path& path, const std::string& name, Scene& scene,
+                  LoadContext& context) {
     context.throwIfCancelled();
     const GltfDocument document = openGltf(path, name, context);
     const std::vector<Placement> placements = NodeWalk(document, scene).run();
-    if (placements.empty()) throw Error(ErrorCode::kInvalidScene, document.name, "its scene shows no triangles");
+    if (placements.empty())
+        throw Error(ErrorCode::kInvalidScene, document.name, "its scene shows no triangles");
 
     const Affine& first = placements[0].group_from_child;
-    if (placements.size() == 1 && first.linear == DMat3(1.0) && first.translation == DVec3(0.0)) return placements[0].child;
+    if (placements.size() == 1 && first.linear == DMat3(1.0) && first.translation == DVec3(0.0))
+        return placements[0].child;
     DBox3 domain;
     for (const Placement& p : placements) domain.extend(p.group_from_child.translation);
     Group group;
@@ -270,7 +315,8 @@ ChildRef loadGltf(const std::filesystem::path& path, const std::string& name, Sc
     return ChildRef::group(uint32_t(scene.groups.size() - 1));
 }
 
-ChildRef loadGltf(const std::string& path, Scene& scene, const LoadOptions& options, Diagnostics& diagnostics) {
+ChildRef loadGltf(const std::string& path, Scene& scene, const LoadOptions& options,
+                  Diagnostics& diagnostics) {
     LoadContext context(options, diagnostics, folderOf(path));
     return loadGltf(std::filesystem::path(path), path, scene, context);
 }

@@ -6,7 +6,9 @@
 
 namespace stipple {
 
-// As loadGltf() of load.h, with the folder, the memory budget and the warnings of the whole. name: how errors call the file.
-ChildRef loadGltf(const std::filesystem::path& path, const std::string& name, Scene& scene, LoadContext& context);
+// As loadGltf() of load.h, with the folder, the memory budget and the warnings of the whole. name:
+// how errors call the file.
+ChildRef loadGltf(const std::filesystem::path& path, const std::string& name, Scene& scene,
+                  LoadContext& context);
 
 }  // namespace stipple

@@ -71,7 +71,8 @@ const GltfMaterial& GltfMaterials::get(int material, const std::string& path) {
     return materials_.emplace(material, result).first->second;
 }
 
-Material GltfMaterials::convert(const tinygltf::Material& source, GltfTextureUse& use, const std::string& path) {
+Material GltfMaterials::convert(const tinygltf::Material& source, GltfTextureUse& use,
+                                const std::string& path) {
     const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
     Material m;
     m.name = source.name;
@@ -87,7 +88,8 @@ Material GltfMaterials::convert(const tinygltf::Material& source, GltfTextureUse
     m.alpha = m.alpha_mode == AlphaMode::kOpaque ? 1.0f : float(pbr.baseColorFactor[3]);
     if (pbr.baseColorTexture.index >= 0) {
         const std::string texture_path = path + ".pbrMetallicRoughness.baseColorTexture.index";
-        m.base_texture = texture(pbr.baseColorTexture.index, m.alpha_mode == AlphaMode::kOpaque, texture_path);
+        m.base_texture =
+            texture(pbr.baseColorTexture.index, m.alpha_mode == AlphaMode::kOpaque, texture_path);
         mean_base *= Vec3(mean(pbr.baseColorTexture.index, true, texture_path));
         use = textureUse(pbr.baseColorTexture);
     }
@@ -100,8 +102,9 @@ Material GltfMaterials::convert(const tinygltf::Material& source, GltfTextureUse
         roughness *= texel.g;
         metallic *= texel.b;
     }
-    // Metallic-roughness as diffuse and a Phong lobe: a metal has no diffuse part and mirrors in its colour, all else mirrors 4 %;
-    // a microfacet lobe of width alpha = roughness^2 is about as wide as a Phong lobe of exponent 2 / alpha^2 - 2.
+    // Metallic-roughness as diffuse and a Phong lobe: a metal has no diffuse part and mirrors in
+    // its colour, all else mirrors 4 %; a microfacet lobe of width alpha = roughness^2 is about as
+    // wide as a Phong lobe of exponent 2 / alpha^2 - 2.
     if (m.unlit) {
         m.base_color = base;
     } else {
@@ -112,12 +115,15 @@ Material GltfMaterials::convert(const tinygltf::Material& source, GltfTextureUse
     }
 
     m.emissive = Vec3(source.emissiveFactor[0], source.emissiveFactor[1], source.emissiveFactor[2]);
-    if (const tinygltf::Value* strength = extension(source.extensions, "KHR_materials_emissive_strength")) {
+    if (const tinygltf::Value* strength =
+            extension(source.extensions, "KHR_materials_emissive_strength")) {
         m.emissive *= float(numberOf(*strength, "emissiveStrength", 1.0));
     }
     if (source.emissiveTexture.index >= 0 && m.emissive != Vec3(0.0f)) {
-        m.emissive *= Vec3(mean(source.emissiveTexture.index, true, path + ".emissiveTexture.index"));
-        document_.context.warnOnce(document_.name, "emissive textures are replaced by their mean colour");
+        m.emissive *=
+            Vec3(mean(source.emissiveTexture.index, true, path + ".emissiveTexture.index"));
+        document_.context.warnOnce(document_.name,
+                                   "emissive textures are replaced by their mean colour");
     }
     return m;
 }
@@ -127,8 +133,10 @@ int GltfMaterials::imageOf(int texture, const std::string& path) const {
     const tinygltf::Texture& t = document_.model.textures[texture];
     const std::string texture_path = "textures[" + std::to_string(texture) + "]";
     int source = t.source;
-    if (const tinygltf::Value* webp = extension(t.extensions, "EXT_texture_webp")) source = webp->Get("source").GetNumberAsInt();
-    if (source < 0) document_.fail(ErrorCode::kUnsupported, texture_path, "has no source that is known");
+    if (const tinygltf::Value* webp = extension(t.extensions, "EXT_texture_webp"))
+        source = webp->Get("source").GetNumberAsInt();
+    if (source < 0)
+        document_.fail(ErrorCode::kUnsupported, texture_path, "has no source that is known");
     document_.checkIndex(source, document_.images.size(), texture_path + ".source", "images");
     return source;
 }
@@ -137,7 +145,8 @@ const Texture::Level& GltfMaterials::picture(int image) {
     if (const auto it = pictures_.find(image); it != pictures_.end()) return it->second;
     document_.context.throwIfCancelled();
     const std::string where = document_.where("images[" + std::to_string(image) + "]");
-    Texture::Level level = decodePicture(imageBytes(document_, image), document_.context.budget, where);
+    Texture::Level level =
+        decodePicture(imageBytes(document_, image), document_.context.budget, where);
     document_.context.budget.take(double(level.rgba.size()), where, "the picture's texels");
     return pictures_.emplace(image, std::move(level)).first->second;
 }
@@ -165,7 +174,9 @@ int GltfMaterials::texture(int index, bool is_opaque, const std::string& path) {
     const int image = imageOf(index, path);
     const tinygltf::Texture& source = document_.model.textures[index];
     const std::string sampler_path = "textures[" + std::to_string(index) + "].sampler";
-    if (source.sampler >= 0) document_.checkIndex(source.sampler, document_.model.samplers.size(), sampler_path, "samplers");
+    if (source.sampler >= 0)
+        document_.checkIndex(source.sampler, document_.model.samplers.size(), sampler_path,
+                             "samplers");
     const auto key = std::make_tuple(image, source.sampler, is_opaque);
     if (const auto it = textures_.find(key); it != textures_.end()) return it->second;
 
@@ -178,7 +189,8 @@ int GltfMaterials::texture(int index, bool is_opaque, const std::string& path) {
         result.nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
     }
     result.levels.push_back(picture(image));
-    document_.context.budget.take(double(result.levels[0].rgba.size()) * 3.0, document_.where(path), "the texture's texels");
+    document_.context.budget.take(double(result.levels[0].rgba.size()) * 3.0, document_.where(path),
+                                  "the texture's texels");
     if (is_opaque) {
         for (size_t i = 3; i < result.levels[0].rgba.size(); i += 4) result.levels[0].rgba[i] = 255;
     }

@@ -10,7 +10,8 @@
 
 namespace stipple {
 
-// Where a base texture is looked up: which TEXCOORD set, and KHR_texture_transform, which loaders bake into the uvs.
+// Where a base texture is looked up: which TEXCOORD set, and KHR_texture_transform, which loaders
+// bake into the uvs.
 struct GltfTextureUse {
     bool is_textured = false;
     int texcoord = 0;
@@ -29,25 +30,29 @@ struct GltfMaterial {
 // Adds the materials that are asked for to the scene, each once.
 class GltfMaterials {
 public:
-    GltfMaterials(const GltfDocument& document, Scene& scene) : document_(document), scene_(scene) {}
+    GltfMaterials(const GltfDocument& document, Scene& scene)
+        : document_(document), scene_(scene) {}
 
     // material: index in the file, -1 for glTF's default. path: where that index stands.
     const GltfMaterial& get(int material, const std::string& path);
 
 private:
-    // Texture (index in the file) as Scene::textures index. is_opaque: alpha has no meaning and is set to 1.
+    // Texture (index in the file) as Scene::textures index. is_opaque: alpha has no meaning and is
+    // set to 1.
     int texture(int index, bool is_opaque, const std::string& path);
     int imageOf(int texture, const std::string& path) const;
     const Texture::Level& picture(int image);
     // Mean of a texture's texels, as linear values.
     Vec4 mean(int texture, bool is_srgb, const std::string& path);
-    Material convert(const tinygltf::Material& source, GltfTextureUse& use, const std::string& path);
+    Material convert(const tinygltf::Material& source, GltfTextureUse& use,
+                     const std::string& path);
 
     const GltfDocument& document_;
     Scene& scene_;
     std::map<int, GltfMaterial> materials_;
     std::map<int, Texture::Level> pictures_;
-    std::map<std::tuple<int, int, bool>, int> textures_;  // by image, sampler and whether it is opaque
+    std::map<std::tuple<int, int, bool>, int>
+        textures_;  // by image, sampler and whether it is opaque
 };
 
 }  // namespace stipple

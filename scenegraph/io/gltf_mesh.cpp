@@ -28,27 +28,32 @@ std::vector<V> asVectors(const std::vector<float>& values) {
     return result;
 }
 
-// Attribute `name` as vectors, empty if the primitive has none. Throws if it has another count than `n_vertices`.
+// Attribute `name` as vectors, empty if the primitive has none. Throws if it has another count than
+// `n_vertices`.
 template <class V>
-std::vector<V> readAttribute(const GltfDocument& document, const tinygltf::Primitive& primitive, const std::string& name,
-                             std::initializer_list<int> types, float fill, size_t n_vertices, const std::string& path) {
+std::vector<V> readAttribute(const GltfDocument& document, const tinygltf::Primitive& primitive,
+                             const std::string& name, std::initializer_list<int> types, float fill,
+                             size_t n_vertices, const std::string& path) {
     const auto it = primitive.attributes.find(name);
     if (it == primitive.attributes.end()) return {};
     const std::string place = path + ".attributes." + name;
     const size_t count = accessorCount(document, it->second, types, place);
     if (count != n_vertices) {
-        document.fail(ErrorCode::kInvalidScene, place,
-                      "count " + std::to_string(count) + ", but POSITION has " + std::to_string(n_vertices));
+        document.fail(
+            ErrorCode::kInvalidScene, place,
+            "count " + std::to_string(count) + ", but POSITION has " + std::to_string(n_vertices));
     }
     return asVectors<V>(readFloats(document, it->second, V::length(), fill, place));
 }
 
-// Triangles of a list, strip or fan of indices. In a strip every second triangle turns the other way round.
+// Triangles of a list, strip or fan of indices. In a strip every second triangle turns the other
+// way round.
 std::vector<UVec3> assemble(const std::vector<uint32_t>& i, int mode) {
     std::vector<UVec3> triangles;
     if (mode == TINYGLTF_MODE_TRIANGLES) {
         triangles.reserve(i.size() / 3);
-        for (size_t t = 0; t + 2 < i.size(); t += 3) triangles.emplace_back(i[t], i[t + 1], i[t + 2]);
+        for (size_t t = 0; t + 2 < i.size(); t += 3)
+            triangles.emplace_back(i[t], i[t + 1], i[t + 2]);
         return triangles;
     }
     for (size_t t = 0; t + 2 < i.size(); ++t) {
@@ -108,8 +113,9 @@ void makeFlat(Primitive& p) {
     p = std::move(flat);
 }
 
-std::optional<Primitive> loadPrimitive(const GltfDocument& document, const tinygltf::Primitive& source,
-                                       GltfMaterials& materials, const std::string& path) {
+std::optional<Primitive> loadPrimitive(const GltfDocument& document,
+                                       const tinygltf::Primitive& source, GltfMaterials& materials,
+                                       const std::string& path) {
     LoadContext& context = document.context;
     if (source.mode < TINYGLTF_MODE_TRIANGLES) {
         context.warnOnce(document.name, "points and lines are skipped");
@@ -124,12 +130,16 @@ std::optional<Primitive> loadPrimitive(const GltfDocument& document, const tinyg
 
     const std::string position_path = path + ".attributes.POSITION";
     const size_t n = accessorCount(document, position->second, {TINYGLTF_TYPE_VEC3}, position_path);
-    const size_t n_indices = source.indices < 0
-                                 ? n
-                                 : accessorCount(document, source.indices, {TINYGLTF_TYPE_SCALAR}, path + ".indices");
-    const double n_triangles = source.mode == TINYGLTF_MODE_TRIANGLES ? double(n_indices / 3) : double(n_indices);
-    context.budget.take(double(n) * kBytesPerVertex + n_triangles * kBytesPerTriangle, document.where(path),
-                        std::to_string(n) + " vertices and " + std::to_string(uint64_t(n_triangles)) + " triangles");
+    const size_t n_indices =
+        source.indices < 0
+            ? n
+            : accessorCount(document, source.indices, {TINYGLTF_TYPE_SCALAR}, path + ".indices");
+    const double n_triangles =
+        source.mode == TINYGLTF_MODE_TRIANGLES ? double(n_indices / 3) : double(n_indices);
+    context.budget.take(double(n) * kBytesPerVertex + n_triangles * kBytesPerTriangle,
+                        document.where(path),
+                        std::to_string(n) + " vertices and " +
+                            std::to_string(uint64_t(n_triangles)) + " triangles");
 
     Primitive p;
     p.positions = asVectors<Vec3>(readFloats(document, position->second, 3, 0.0f, position_path));
@@ -143,8 +153,9 @@ std::optional<Primitive> loadPrimitive(const GltfDocument& document, const tinyg
         indices = readIndices(document, source.indices, path + ".indices");
         for (uint32_t index : indices) {
             if (index >= n) {
-                document.fail(ErrorCode::kInvalidScene, path + ".indices",
-                              "index " + std::to_string(index) + " >= vertex count " + std::to_string(n));
+                document.fail(
+                    ErrorCode::kInvalidScene, path + ".indices",
+                    "index " + std::to_string(index) + " >= vertex count " + std::to_string(n));
             }
         }
     } else {
@@ -152,28 +163,34 @@ std::optional<Primitive> loadPrimitive(const GltfDocument& document, const tinyg
         std::iota(indices.begin(), indices.end(), 0u);
     }
     if (source.mode == TINYGLTF_MODE_TRIANGLES && indices.size() % 3) {
-        context.warnOnce(document.name, path + ": the last " + std::to_string(indices.size() % 3) + " indices are no triangle");
+        context.warnOnce(document.name, path + ": the last " + std::to_string(indices.size() % 3) +
+                                            " indices are no triangle");
     }
     p.triangles = assemble(indices, source.mode);
 
     const GltfMaterial& material = materials.get(source.material, path + ".material");
     p.material = material.index;
-    p.normals = readAttribute<Vec3>(document, source, "NORMAL", {TINYGLTF_TYPE_VEC3}, 0.0f, n, path);
-    p.colors = readAttribute<Vec4>(document, source, "COLOR_0", {TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, 1.0f, n, path);
+    p.normals =
+        readAttribute<Vec3>(document, source, "NORMAL", {TINYGLTF_TYPE_VEC3}, 0.0f, n, path);
+    p.colors = readAttribute<Vec4>(document, source, "COLOR_0",
+                                   {TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, 1.0f, n, path);
     for (Vec4& color : p.colors) color = glm::max(color, Vec4(0.0f));
     if (material.base_texture.is_textured) {
         const std::string set = "TEXCOORD_" + std::to_string(material.base_texture.texcoord);
         p.uvs = readAttribute<Vec2>(document, source, set, {TINYGLTF_TYPE_VEC2}, 0.0f, n, path);
-        if (p.uvs.empty()) context.warnOnce(document.name, path + " is textured, but has no " + set);
+        if (p.uvs.empty())
+            context.warnOnce(document.name, path + " is textured, but has no " + set);
         for (Vec2& uv : p.uvs) uv = material.base_texture.apply(uv);
     }
     if (!p.normals.empty()) normalize(p);
     return p;
 }
 
-// Appends `from` to `to`, which has `n_before` elements where it is not empty; missing elements become `fill`.
+// Appends `from` to `to`, which has `n_before` elements where it is not empty; missing elements
+// become `fill`.
 template <class V>
-void appendAttribute(std::vector<V>& to, const std::vector<V>& from, size_t n_before, size_t n_new, const V& fill) {
+void appendAttribute(std::vector<V>& to, const std::vector<V>& from, size_t n_before, size_t n_new,
+                     const V& fill) {
     if (to.empty() && from.empty()) return;
     to.resize(n_before, fill);
     to.insert(to.end(), from.begin(), from.end());
@@ -194,10 +211,12 @@ Mesh loadGltfMesh(const GltfDocument& document, int index, GltfMaterials& materi
         auto p = loadPrimitive(document, source.primitives[i], materials, primitive_path);
         if (p && !p->triangles.empty()) primitives.push_back(std::move(*p));
     }
-    const bool any_normals = std::any_of(primitives.begin(), primitives.end(), [](const auto& p) { return !p.normals.empty(); });
+    const bool any_normals = std::any_of(primitives.begin(), primitives.end(),
+                                         [](const auto& p) { return !p.normals.empty(); });
     for (Primitive& p : primitives) {
         if (any_normals && p.normals.empty()) {
-            document.context.budget.take(double(p.triangles.size()) * 3.0 * kBytesPerVertex, document.where(path), "flat normals");
+            document.context.budget.take(double(p.triangles.size()) * 3.0 * kBytesPerVertex,
+                                         document.where(path), "flat normals");
             makeFlat(p);
         }
         const size_t before = mesh.positions.size(), n = p.positions.size();

@@ -6,8 +6,8 @@
 
 namespace stipple {
 
-// All triangles of meshes[index], primitives merged; a mesh without triangles if it has only points and lines (with a
-// warning). Not yet built.
+// All triangles of meshes[index], primitives merged; a mesh without triangles if it has only points
+// and lines (with a warning). Not yet built.
 Mesh loadGltfMesh(const GltfDocument& document, int index, GltfMaterials& materials);
 
 }  // namespace stipple

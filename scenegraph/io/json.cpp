@@ -36,14 +36,16 @@ public:
     bool key(string_t& name) override {
         auto [it, is_new] = stack_.back()->get_ref<Json::object_t&>().try_emplace(name, nullptr);
         slot_ = &it->second;
-        if (!is_new) problem = "key " + inQuotes(name) + " stands twice in " + jsonPointer(pathOfTop());
+        if (!is_new)
+            problem = "key " + inQuotes(name) + " stands twice in " + jsonPointer(pathOfTop());
         return is_new;
     }
 
     bool parse_error(size_t byte, const std::string&, const Json::exception& e) override {
         problem = e.what();
         problem_byte = byte;
-        // "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error while parsing value - ..."
+        // "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error while
+        // parsing value - ..."
         const size_t syntax = problem.find("syntax error");
         const size_t bracket = problem.find("] ");
         if (syntax != std::string::npos) {
@@ -90,19 +92,22 @@ private:
         return path;
     }
 
-    std::vector<Json*> stack_;  // open objects and arrays; an open one is the last element of its parent, so it stays put
+    std::vector<Json*> stack_;  // open objects and arrays; an open one is the last element of its
+                                // parent, so it stays put
     Json* slot_ = nullptr;
 };
 
 std::string lineAndColumn(std::string_view text, size_t byte) {
     const std::string_view before = text.substr(0, std::min(byte ? byte - 1 : 0, text.size()));
     const size_t line_start = before.rfind('\n');
-    const size_t column = before.size() - (line_start == std::string_view::npos ? 0 : line_start + 1);
-    return "line " + std::to_string(1 + std::count(before.begin(), before.end(), '\n')) + ", column " +
-           std::to_string(1 + column);
+    const size_t column =
+        before.size() - (line_start == std::string_view::npos ? 0 : line_start + 1);
+    return "line " + std::to_string(1 + std::count(before.begin(), before.end(), '\n')) +
+           ", column " + std::to_string(1 + column);
 }
 
-// The schemas within `schema` that speak about `value`: itself, references, and the branches that apply.
+// The schemas within `schema` that speak about `value`: itself, references, and the branches that
+// apply.
 void collectSchemas(const Json& root, const Json& schema, std::vector<const Json*>& found) {
     if (!schema.is_object()) return;
     found.push_back(&schema);
@@ -136,7 +141,8 @@ std::string allowedValues(const Json& root, const JsonPath& path) {
     std::string list;
     for (const Json* schema : schemas) {
         if (!schema->contains("enum")) continue;
-        for (const Json& value : (*schema)["enum"]) list += (list.empty() ? "" : ", ") + value.dump();
+        for (const Json& value : (*schema)["enum"])
+            list += (list.empty() ? "" : ", ") + value.dump();
     }
     return list;
 }
@@ -152,7 +158,8 @@ const Json* valueAt(const Json& root, const JsonPath& path) {
 // valijson's "[assets]", "[0]" as keys and indices.
 JsonPath stepsOf(const std::vector<std::string>& context) {
     JsonPath path;
-    for (size_t i = 1; i < context.size(); ++i) path.push_back(context[i].substr(1, context[i].size() - 2));
+    for (size_t i = 1; i < context.size(); ++i)
+        path.push_back(context[i].substr(1, context[i].size() - 2));
     return path;
 }
 
@@ -161,8 +168,10 @@ JsonPath stepsOf(const std::vector<std::string>& context) {
 Json parseJson(std::string_view text, const std::string& where) {
     DocumentBuilder builder;
     if (!Json::sax_parse(text.begin(), text.end(), &builder)) {
-        const std::string place = builder.problem_byte ? ": " + lineAndColumn(text, builder.problem_byte) : "";
-        throw Error(ErrorCode::kParse, where + place, "not valid JSON: " + oneLine(builder.problem, 200));
+        const std::string place =
+            builder.problem_byte ? ": " + lineAndColumn(text, builder.problem_byte) : "";
+        throw Error(ErrorCode::kParse, where + place,
+                    "not valid JSON: " + oneLine(builder.problem, 200));
     }
     return std::move(builder.root);
 }
@@ -179,7 +188,9 @@ std::string jsonPointer(const JsonPath& path) {
 std::string gltfPath(const JsonPath& path) {
     std::string text;
     for (const std::string& step : path) {
-        const bool is_index = !step.empty() && std::all_of(step.begin(), step.end(), [](char c) { return c >= '0' && c <= '9'; });
+        const bool is_index = !step.empty() && std::all_of(step.begin(), step.end(), [](char c) {
+            return c >= '0' && c <= '9';
+        });
         text += is_index ? "[" + step + "]" : (text.empty() ? "" : ".") + step;
     }
     return text.empty() ? "root" : oneLine(text, 300);
@@ -189,7 +200,8 @@ std::string oneLine(std::string_view text, size_t max_length) {
     std::string line;
     for (char c : text.substr(0, max_length)) line += uint8_t(c) < 0x20 || c == 0x7f ? ' ' : c;
     if (text.size() <= max_length) return line;
-    while (!line.empty() && (line.back() & 0xc0) == 0x80) line.pop_back();  // no half UTF-8 characters
+    while (!line.empty() && (line.back() & 0xc0) == 0x80)
+        line.pop_back();  // no half UTF-8 characters
     if (!line.empty() && (line.back() & 0xc0) == 0xc0) line.pop_back();
     return line + "...";
 }
@@ -206,7 +218,8 @@ struct JsonSchema::Impl {
     valijson::Schema schema;
 };
 
-JsonSchema::JsonSchema(const char* schema_text, const std::string& definition) : impl_(std::make_unique<Impl>()) {
+JsonSchema::JsonSchema(const char* schema_text, const std::string& definition)
+    : impl_(std::make_unique<Impl>()) {
     impl_->document = Json::parse(schema_text);
     if (!definition.empty()) {
         const Json definitions = impl_->document["definitions"];
@@ -222,7 +235,8 @@ std::optional<JsonSchema::Problem> JsonSchema::firstProblem(const Json& value) c
     valijson::Validator validator;
     valijson::ValidationResults results;
     const valijson::adapters::NlohmannJsonAdapter target(value);
-    if (validator.validate(impl_->schema, target, nullptr)) return std::nullopt;  // the common case without bookkeeping
+    if (validator.validate(impl_->schema, target, nullptr))
+        return std::nullopt;  // the common case without bookkeeping
     validator.validate(impl_->schema, target, &results);
     valijson::ValidationResults::Error error;
     if (!results.popError(error)) return Problem{{}, "does not match the schema"};
@@ -231,8 +245,10 @@ std::optional<JsonSchema::Problem> JsonSchema::firstProblem(const Json& value) c
     Problem problem{stepsOf(error.context), error.description};
     const std::string& text = error.description;
     const size_t quote = text.rfind(": '");
-    if (text.find("could not be validated using 'properties'") != std::string::npos && quote != std::string::npos) {
-        problem.message = "unknown key " + inQuotes(text.substr(quote + 3, text.rfind('\'') - quote - 3));
+    if (text.find("could not be validated using 'properties'") != std::string::npos &&
+        quote != std::string::npos) {
+        problem.message =
+            "unknown key " + inQuotes(text.substr(quote + 3, text.rfind('\'') - quote - 3));
         return problem;
     }
     const Json& culprit = *valueAt(value, problem.path);
@@ -244,7 +260,8 @@ std::optional<JsonSchema::Problem> JsonSchema::firstProblem(const Json& value) c
     } else if (is_type) {
         problem.message += std::string(", got an ") + culprit.type_name();
     }
-    if (const std::string allowed = allowedValues(impl_->document, problem.path); !allowed.empty()) {
+    if (const std::string allowed = allowedValues(impl_->document, problem.path);
+        !allowed.empty()) {
         problem.message = oneLine(culprit.dump(-1, ' ', true), 60) + " is none of " + allowed;
     }
     return problem;

@@ -37,13 +37,15 @@ bool endsWith(const std::string& path, const char* extension) {
 
 }  // namespace
 
-Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool& pool, Diagnostics& diagnostics) {
+Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool& pool,
+                Diagnostics& diagnostics) {
     try {
         LoadContext context(options, diagnostics, folderOf(path));
         context.throwIfCancelled();
         const bool is_asset = endsWith(path, ".gltf") || endsWith(path, ".glb");
         if (!is_asset && !endsWith(path, ".scene.json")) {
-            throw Error(ErrorCode::kUnsupported, oneLine(path, 300), "is neither a scene file (*.scene.json) nor .gltf nor .glb");
+            throw Error(ErrorCode::kUnsupported, oneLine(path, 300),
+                        "is neither a scene file (*.scene.json) nor .gltf nor .glb");
         }
         Scene scene = is_asset ? loadAsset(path, context) : readSceneFile(path, path, context);
         scene.path = path;
@@ -51,7 +53,9 @@ Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool&
         buildScene(scene, pool);
         const DBox3 bounds = sceneBounds(scene);
         if (bounds.isEmpty()) {
-            if (is_asset) throw Error(ErrorCode::kInvalidScene, oneLine(path, 300), "all its triangles have no area");
+            if (is_asset)
+                throw Error(ErrorCode::kInvalidScene, oneLine(path, 300),
+                            "all its triangles have no area");
             diagnostics.warn(oneLine(path, 300), "the scene is empty");
         }
         // Single assets always have a camera of that name, before their own.
@@ -61,8 +65,14 @@ Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool&
             scene.cameras.insert(scene.cameras.begin(), camera);
         }
         return scene;
+    } catch (const Error&) {
+        throw;
     } catch (const std::bad_alloc&) {
-        throw Error(ErrorCode::kOutOfMemory, oneLine(path, 300), "the machine has not enough memory for it");
+        throw Error(ErrorCode::kOutOfMemory, oneLine(path, 300),
+                    "the machine has not enough memory for it");
+    } catch (const std::exception&
+                 e) {  // a defect, but no reason to end a program that loads many files
+        throw Error(ErrorCode::kInternal, oneLine(path, 300), oneLine(e.what()));
     }
 }
 

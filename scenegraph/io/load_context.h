@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What all loaders share while one scene is loaded: the folder that files may come from, the memory left, warnings and the
-// cancel flag.
+// What all loaders share while one scene is loaded: the folder that files may come from, the memory
+// left, warnings and the cancel flag.
 #pragma once
 
 #include <scenegraph/io/load.h>
@@ -17,7 +17,8 @@ public:
     // limit_mb: 0 for 80 % of the machine's memory.
     explicit MemoryBudget(uint64_t limit_mb);
 
-    // Throws kOutOfMemory unless `bytes` more fit; what: "10000 triangles". The bytes are not counted as used.
+    // Throws kOutOfMemory unless `bytes` more fit; what: "10000 triangles". The bytes are not
+    // counted as used.
     void require(double bytes, const std::string& where, const std::string& what) const;
     // The same, and counts them.
     void take(double bytes, const std::string& where, const std::string& what);
@@ -39,7 +40,8 @@ struct LoadContext {
 
     const LoadOptions& options;
     Diagnostics& diagnostics;
-    std::filesystem::path folder;  // canonical; files must lie below it unless options.allow_outside
+    std::filesystem::path
+        folder;  // canonical; files must lie below it unless options.allow_outside
     MemoryBudget budget;
     std::set<std::string> warned;  // warnings given, so that each is given once
 
@@ -50,12 +52,15 @@ struct LoadContext {
 // The folder of `file` as LoadContext::folder wants it. Throws kFileNotFound.
 std::filesystem::path folderOf(const std::string& file);
 
-// The regular file that `relative` (UTF-8, seen from `base`) names, with symbolic links resolved. Throws kFileNotFound, or
-// kInvalidScene if it lies outside of context.folder and that is not allowed.
-std::filesystem::path resolvePath(const LoadContext& context, const std::filesystem::path& base, const std::string& relative,
-                                  const std::string& where);
+// The regular file that `relative` (UTF-8, seen from `base`) names, with symbolic links resolved.
+// Throws kFileNotFound, or kInvalidScene if it lies outside of context.folder and that is not
+// allowed.
+std::filesystem::path resolvePath(const LoadContext& context, const std::filesystem::path& base,
+                                  const std::string& relative, const std::string& where);
 
-// The whole file. Throws kFileNotFound if it is none, cannot be read or is not a regular file; kOutOfMemory.
-std::string readFile(const std::filesystem::path& path, const MemoryBudget& budget, const std::string& where);
+// The whole file. Throws kFileNotFound if it is none, cannot be read or is not a regular file;
+// kOutOfMemory.
+std::string readFile(const std::filesystem::path& path, const MemoryBudget& budget,
+                     const std::string& where);
 
 }  // namespace stipple

@@ -12,8 +12,8 @@ namespace {
 
 constexpr int kMaxSide = 32768;  // pixels
 
-// OpenImageIO's name of the format, by the file's first bytes. The formats of glTF only: every further decoder would be
-// one more way in for a damaged file.
+// OpenImageIO's name of the format, by the file's first bytes. The formats of glTF only: every
+// further decoder would be one more way in for a damaged file.
 const char* formatOf(const std::string& bytes) {
     if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return "png";
     if (bytes.starts_with("\xff\xd8\xff")) return "jpeg";
@@ -23,31 +23,39 @@ const char* formatOf(const std::string& bytes) {
 
 }  // namespace
 
-Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budget, const std::string& where) {
-    if (bytes.size() < 12) throw Error(ErrorCode::kParse, where, "not a picture: only " + std::to_string(bytes.size()) + " bytes");
+Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budget,
+                             const std::string& where) {
+    if (bytes.size() < 12)
+        throw Error(ErrorCode::kParse, where,
+                    "not a picture: only " + std::to_string(bytes.size()) + " bytes");
     const char* format = formatOf(bytes);
     if (!format) throw Error(ErrorCode::kUnsupported, where, "not a PNG, JPEG or WebP picture");
     const auto fail = [&](const std::string& reason) {
-        throw Error(ErrorCode::kParse, where, std::string("damaged ") + format + " picture: " + oneLine(reason));
+        throw Error(ErrorCode::kParse, where,
+                    std::string("damaged ") + format + " picture: " + oneLine(reason));
     };
 
     OIIO::Filesystem::IOMemReader memory(const_cast<char*>(bytes.data()), bytes.size());
     const auto input = OIIO::ImageInput::create(format);
     if (!input || !input->set_ioproxy(&memory)) {
-        throw Error(ErrorCode::kUnsupported, where, std::string("OpenImageIO cannot read ") + format + " from memory");
+        throw Error(ErrorCode::kUnsupported, where,
+                    std::string("OpenImageIO cannot read ") + format + " from memory");
     }
     OIIO::ImageSpec spec, hints;
     hints["oiio:UnassociatedAlpha"] = 1;  // colours are not multiplied with alpha, as glTF has it
     if (!input->open(std::string("picture.") + format, spec, hints)) fail(input->geterror());
-    if (spec.width < 1 || spec.height < 1 || spec.width > kMaxSide || spec.height > kMaxSide || spec.nchannels < 1 ||
-        spec.nchannels > 16) {
-        fail(std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels are too many or none");
+    if (spec.width < 1 || spec.height < 1 || spec.width > kMaxSide || spec.height > kMaxSide ||
+        spec.nchannels < 1 || spec.nchannels > 16) {
+        fail(std::to_string(spec.width) + " x " + std::to_string(spec.height) +
+             " pixels are too many or none");
     }
     const size_t n_pixels = size_t(spec.width) * spec.height;
     const int n_channels = spec.nchannels;
-    budget.require(double(n_pixels) * (4 + n_channels), where, std::to_string(n_pixels) + " pixels");
+    budget.require(double(n_pixels) * (4 + n_channels), where,
+                   std::to_string(n_pixels) + " pixels");
     std::vector<uint8_t> raw(n_pixels * n_channels);
-    if (!input->read_image(0, 0, 0, n_channels, OIIO::TypeDesc::UINT8, raw.data())) fail(input->geterror());
+    if (!input->read_image(0, 0, 0, n_channels, OIIO::TypeDesc::UINT8, raw.data()))
+        fail(input->geterror());
 
     // 1: grey, 2: grey and alpha, 3: RGB, 4 and more: RGBA.
     Texture::Level level{spec.width, spec.height, std::vector<uint8_t>(n_pixels * 4)};

@@ -9,8 +9,9 @@
 
 namespace stipple {
 
-// Decodes a PNG, JPEG or WebP picture into 8-bit RGBA. Throws kParse (not a picture, damaged), kUnsupported (another format),
-// kOutOfMemory.
-Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budget, const std::string& where);
+// Decodes a PNG, JPEG or WebP picture into 8-bit RGBA. Throws kParse (not a picture, damaged),
+// kUnsupported (another format), kOutOfMemory.
+Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budget,
+                             const std::string& where);
 
 }  // namespace stipple

@@ -12,26 +12,32 @@ ChildRef loadFile(SceneReader& reader, const Json& asset, const JsonPath& path) 
     JsonPath file_path = path;
     file_path.push_back("file");
     const std::string& file = asset["file"].get_ref<const std::string&>();
-    const std::filesystem::path full = resolvePath(reader.context, reader.folder, file, reader.where(file_path));
+    const std::filesystem::path full =
+        resolvePath(reader.context, reader.folder, file, reader.where(file_path));
     std::string extension = full.extension().string();
     for (char& c : extension) c = char(std::tolower(uint8_t(c)));
     if (extension != ".gltf" && extension != ".glb") {
-        throw Error(ErrorCode::kUnsupported, reader.where(file_path), inQuotes(file) + " is neither .gltf nor .glb");
+        throw Error(ErrorCode::kUnsupported, reader.where(file_path),
+                    inQuotes(file) + " is neither .gltf nor .glb");
     }
-    if (const auto it = reader.files.find(full.string()); it != reader.files.end()) return it->second;
+    if (const auto it = reader.files.find(full.string()); it != reader.files.end())
+        return it->second;
     // Cameras and lights of an asset that stands in many places mean nothing.
-    const size_t n_cameras = reader.scene.cameras.size(), n_suns = reader.scene.lighting.suns.size();
+    const size_t n_cameras = reader.scene.cameras.size(),
+                 n_suns = reader.scene.lighting.suns.size();
     const ChildRef child = loadGltf(full, file, reader.scene, reader.context);
     reader.scene.cameras.resize(n_cameras);
     reader.scene.lighting.suns.resize(n_suns);
     return reader.files[full.string()] = child;
 }
 
-GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json& asset, const JsonPath& path) {
+GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json& asset,
+                       const JsonPath& path) {
     const std::string kind = asset["generate"].get<std::string>();
     const auto takeTriangles = [&](double triangles) {
         // Leaves and blades share few vertices: two for each triangle.
-        reader.context.budget.take(triangles * (kBytesPerTriangle + 2.0 * kBytesPerVertex), reader.where(path),
+        reader.context.budget.take(triangles * (kBytesPerTriangle + 2.0 * kBytesPerVertex),
+                                   reader.where(path),
                                    std::to_string(uint64_t(triangles)) + " triangles");
     };
     if (kind == "tree") {
@@ -82,13 +88,16 @@ GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json&
     return makePrimitive(kind, triangles, color);
 }
 
-ChildRef addGenerated(SceneReader& reader, const std::string& name, GeneratedMesh generated, const JsonPath& path) {
+ChildRef addGenerated(SceneReader& reader, const std::string& name, GeneratedMesh generated,
+                      const JsonPath& path) {
     Scene& scene = reader.scene;
     const size_t first = scene.materials.size();
     if (first + generated.materials.size() > size_t(std::numeric_limits<uint16_t>::max()) + 1) {
-        throw Error(ErrorCode::kUnsupported, reader.where(path), "the scene has more than 65536 materials");
+        throw Error(ErrorCode::kUnsupported, reader.where(path),
+                    "the scene has more than 65536 materials");
     }
-    for (uint16_t& material : generated.mesh.triangle_material) material = uint16_t(material + first);
+    for (uint16_t& material : generated.mesh.triangle_material)
+        material = uint16_t(material + first);
     for (Material& material : generated.materials) scene.materials.push_back(std::move(material));
     generated.mesh.name = oneLine(name);
     scene.meshes.push_back(std::move(generated.mesh));
@@ -103,7 +112,9 @@ void readAsset(SceneReader& reader, const std::string& name, const Json& asset) 
         reader.children[name] = loadFile(reader, asset, path);
         return;
     }
-    reader.children[name] = addGenerated(reader, name, generate(reader, name, asset, path), path);
+    GeneratedMesh generated =
+        withPlace(reader, path, [&] { return generate(reader, name, asset, path); });
+    reader.children[name] = addGenerated(reader, name, std::move(generated), path);
 }
 
 }  // namespace stipple

@@ -28,7 +28,8 @@ Camera readCamera(const SceneReader& reader, const Json& source, const JsonPath&
     DVec3 eye(0), up(0, 1, 0), target(0), direction(0);
     readVector(source, "eye", eye);
     readVector(source, "up", up);
-    if (source.contains("target") == source.contains("direction")) reader.fail(path, "needs either target or direction");
+    if (source.contains("target") == source.contains("direction"))
+        reader.fail(path, "needs either target or direction");
     if (source.contains("target")) {
         readVector(source, "target", target);
         direction = unitVector(reader, target - eye, at("target"));
@@ -39,7 +40,8 @@ Camera readCamera(const SceneReader& reader, const Json& source, const JsonPath&
     Camera camera = lookAt(eye, eye + direction, unitVector(reader, up, at("up")));
     camera.eye = eye;
     camera.name = source["name"].get<std::string>();
-    if (source.contains("fov") && source.contains("orthographic")) reader.fail(path, "has both fov and orthographic");
+    if (source.contains("fov") && source.contains("orthographic"))
+        reader.fail(path, "has both fov and orthographic");
     camera.orthographic = source.contains("orthographic");
     readMember(source, "orthographic", camera.height);
     readDegrees(source, "fov", camera.fov_y);
@@ -55,7 +57,8 @@ void readCameras(SceneReader& reader, const Json& cameras) {
         const JsonPath path = {"cameras", std::to_string(i)};
         reader.scene.cameras.push_back(readCamera(reader, cameras[i], path));
         const std::string& name = reader.scene.cameras.back().name;
-        if (!names.insert(name).second) reader.fail(path, "a camera before has the name " + inQuotes(name) + " too");
+        if (!names.insert(name).second)
+            reader.fail(path, "a camera before has the name " + inQuotes(name) + " too");
     }
 }
 
@@ -81,7 +84,8 @@ void readLighting(SceneReader& reader, const Json& root) {
         Sun sun;
         DVec3 direction(0);
         readVector(suns[i], "direction", direction);
-        sun.direction_to_light = Vec3(unitVector(reader, direction, {"lights", "suns", std::to_string(i), "direction"}));
+        sun.direction_to_light =
+            Vec3(unitVector(reader, direction, {"lights", "suns", std::to_string(i), "direction"}));
         readVector(suns[i], "irradiance", sun.irradiance);
         lighting.suns.push_back(sun);
     }
@@ -96,20 +100,22 @@ void readRenderDefaults(SceneReader& reader, const Json& settings) {
         try {
             applySetting(scratch, key, text, where);
         } catch (const Error& e) {  // what is wrong is wrong with the scene here
-            const std::string message = e.what();
-            throw Error(ErrorCode::kInvalidScene, "", message.starts_with(where) ? message : where + ": " + message);
+            const std::string message = oneLine(e.what(), 400);
+            throw Error(ErrorCode::kInvalidScene, "",
+                        message.starts_with(where) ? message : where + ": " + message);
         }
         reader.scene.render_defaults[key] = text;
     }
 }
 
-// Takes the lists of explicit instances out of the document: there may be millions, too many for the schema validator, so that
-// readGroup() checks them.
+// Takes the lists of explicit instances out of the document: there may be millions, too many for
+// the schema validator, so that readGroup() checks them.
 std::map<std::string, Json> takeInstances(Json& root) {
     std::map<std::string, Json> lists;
     if (!root.is_object() || !root.contains("groups") || !root["groups"].is_object()) return lists;
     for (auto& [name, group] : root["groups"].items()) {
-        if (!group.is_object() || !group.contains("instances") || !group["instances"].is_array()) continue;
+        if (!group.is_object() || !group.contains("instances") || !group["instances"].is_array())
+            continue;
         lists[name] = Json::array();
         lists[name].swap(group["instances"]);
     }
@@ -127,17 +133,20 @@ ChildRef SceneReader::child(const std::string& child_name, const JsonPath& path)
                    (nearest.empty() ? "" : "; did you mean " + inQuotes(nearest) + "?"));
 }
 
-Scene readSceneFile(const std::filesystem::path& path, const std::string& name, LoadContext& context) {
+Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
+                    LoadContext& context) {
     SceneReader reader{context, oneLine(name, 300), context.folder, {}, {}, {}, {}};
     Json root;
     {
         const std::string text = readFile(path, context.budget, reader.name);
-        context.budget.require(10.0 * double(text.size()), reader.name, "the JSON document's values");
+        context.budget.require(10.0 * double(text.size()), reader.name,
+                               "the JSON document's values");
         root = parseJson(text, reader.name);
     }
     std::map<std::string, Json> instances = takeInstances(root);
     static const JsonSchema schema(kSceneSchemaText);
-    if (const auto problem = schema.firstProblem(root)) reader.fail(problem->path, problem->message);
+    if (const auto problem = schema.firstProblem(root))
+        reader.fail(problem->path, problem->message);
 
     if (const auto assets = root.find("assets"); assets != root.end()) {
         for (const auto& [asset_name, asset] : assets->items()) {
@@ -171,7 +180,8 @@ Scene readSceneFile(const std::filesystem::path& path, const std::string& name, 
         group.instances.add(root_child, Affine());
         reader.scene.groups.push_back(std::move(group));
     }
-    reader.scene.root = root_child.isGroup() ? root_child.index() : uint32_t(reader.scene.groups.size() - 1);
+    reader.scene.root =
+        root_child.isGroup() ? root_child.index() : uint32_t(reader.scene.groups.size() - 1);
     readLighting(reader, root);
     if (root.contains("cameras")) readCameras(reader, root["cameras"]);
     if (root.contains("render")) readRenderDefaults(reader, root["render"]);

@@ -69,11 +69,14 @@ bool readInstance(const Json& source, Instance& result) {
 const char* makeTransform(const Instance& instance, Affine& result) {
     if (instance.has_matrix) {
         if (instance.has_parts) return "has a matrix and other transforms too";
-        if (!affineFromMatrix(instance.matrix, result)) return "the matrix' last row is not 0 0 0 1";
+        if (!affineFromMatrix(instance.matrix, result))
+            return "the matrix' last row is not 0 0 0 1";
     } else {
-        if (instance.has_angles && instance.has_quaternion) return "has both rotation and quaternion";
+        if (instance.has_angles && instance.has_quaternion)
+            return "has both rotation and quaternion";
         DMat3 rotation(1.0);
-        if (instance.has_quaternion && !rotationFromQuaternion(instance.quaternion, rotation)) return "the quaternion is zero";
+        if (instance.has_quaternion && !rotationFromQuaternion(instance.quaternion, rotation))
+            return "the quaternion is zero";
         if (instance.has_angles) rotation = rotationFromEuler(instance.angles * (kPi / 180.0));
         result = affineFromParts(instance.translation, rotation, instance.scale);
     }
@@ -85,15 +88,18 @@ JsonPath joined(JsonPath path, std::initializer_list<std::string> rest) {
     return path;
 }
 
-// The box of the translations, as far as they can be read; what is wrong is found by addInstances().
+// The box of the translations, as far as they can be read; what is wrong is found by
+// addInstances().
 DBox3 instancesDomain(const Json& instances) {
     DBox3 box;
     for (const Json& source : instances) {
         DVec3 p(0);
         double matrix[16];
         if (source.is_object()) {
-            if (const auto it = source.find("translation"); it != source.end()) readNumbers(*it, 3, kMaxLength, &p.x);
-            if (const auto it = source.find("matrix"); it != source.end() && readNumbers(*it, 16, kMaxLength, matrix)) {
+            if (const auto it = source.find("translation"); it != source.end())
+                readNumbers(*it, 3, kMaxLength, &p.x);
+            if (const auto it = source.find("matrix");
+                it != source.end() && readNumbers(*it, 16, kMaxLength, matrix)) {
                 p = DVec3(matrix[12], matrix[13], matrix[14]);
             }
         }
@@ -102,7 +108,8 @@ DBox3 instancesDomain(const Json& instances) {
     return box;
 }
 
-void addInstances(SceneReader& reader, const Json& instances, InstanceStore& store, const JsonPath& group_path) {
+void addInstances(SceneReader& reader, const Json& instances, InstanceStore& store,
+                  const JsonPath& group_path) {
     size_t i = 0;
     for (const Json& source : instances) {
         if (i % 65536 == 0) reader.context.throwIfCancelled();
@@ -117,7 +124,8 @@ void addInstances(SceneReader& reader, const Json& instances, InstanceStore& sto
             reader.fail(full, problem->message);
         }
         const auto child = reader.children.find(*instance.child);
-        if (child == reader.children.end()) reader.child(*instance.child, joined(path(), {"child"}));  // throws
+        if (child == reader.children.end())
+            reader.child(*instance.child, joined(path(), {"child"}));  // throws
         Affine transform;
         if (const char* problem = makeTransform(instance, transform)) reader.fail(path(), problem);
         store.add(child->second, transform);
@@ -126,11 +134,13 @@ void addInstances(SceneReader& reader, const Json& instances, InstanceStore& sto
 }
 
 template <class T>
-void checkOrder(const SceneReader& reader, const T& low, const T& high, const char* what, const JsonPath& path) {
+void checkOrder(const SceneReader& reader, const T& low, const T& high, const char* what,
+                const JsonPath& path) {
     if (low > high) reader.fail(path, std::string("min_") + what + " > max_" + what);
 }
 
-ScatterParams readScatter(const SceneReader& reader, const Json& source, const HeightField*& field, const JsonPath& path) {
+ScatterParams readScatter(const SceneReader& reader, const Json& source, const HeightField*& field,
+                          const JsonPath& path) {
     ScatterParams p;
     if (source.contains("on")) {
         const std::string& on = source["on"].get_ref<const std::string&>();
@@ -145,7 +155,8 @@ ScatterParams readScatter(const SceneReader& reader, const Json& source, const H
     for (size_t i = 0; i < source["items"].size(); ++i) {
         const Json& item = source["items"][i];
         ScatterItem result;
-        result.child = reader.child(item["child"].get<std::string>(), joined(path, {"items", std::to_string(i), "child"}));
+        result.child = reader.child(item["child"].get<std::string>(),
+                                    joined(path, {"items", std::to_string(i), "child"}));
         readMember(item, "weight", result.weight);
         p.items.push_back(result);
     }
@@ -200,31 +211,38 @@ void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Jso
     double total = double(instances.size());
     const auto count = [&](double n, const char* key) {
         const JsonPath place = joined(path, {key});
-        reader.context.budget.take(n * kBytesPerInstance, reader.where(place), std::to_string(uint64_t(n)) + " instances");
+        reader.context.budget.take(n * kBytesPerInstance, reader.where(place),
+                                   std::to_string(uint64_t(n)) + " instances");
         total += n;
         if (total > double(std::numeric_limits<uint32_t>::max())) {
-            throw Error(ErrorCode::kUnsupported, reader.where(place), "more than 2^32 instances in one group; nest groups instead");
+            throw Error(ErrorCode::kUnsupported, reader.where(place),
+                        "more than 2^32 instances in one group; nest groups instead");
         }
     };
-    reader.context.budget.take(total * kBytesPerInstance, reader.where(path), std::to_string(instances.size()) + " instances");
+    reader.context.budget.take(total * kBytesPerInstance, reader.where(path),
+                               std::to_string(instances.size()) + " instances");
     if (group.contains("scatter")) {
         scattered = readScatter(reader, group["scatter"], field, joined(path, {"scatter"}));
         count(double(scattered.count), "scatter");
-        domain.extend(scatterDomain(scattered, field));
+        domain.extend(withPlace(reader, joined(path, {"scatter"}),
+                                [&] { return scatterDomain(scattered, field); }));
     }
     if (group.contains("grid")) {
         grid = readGrid(reader, group["grid"], joined(path, {"grid"}));
         count(double(grid.count_x) * double(grid.count_z), "grid");
-        domain.extend(gridDomain(grid));
+        domain.extend(withPlace(reader, joined(path, {"grid"}), [&] { return gridDomain(grid); }));
     }
     if (domain.isEmpty()) domain = DBox3{DVec3(-1), DVec3(1)};
 
     InstanceStore store(domain);
     store.reserve(size_t(total));
     addInstances(reader, instances, store, path);
-    if (group.contains("scatter")) scatter(scattered, field, store);
+    if (group.contains("scatter")) {
+        withPlace(reader, joined(path, {"scatter"}), [&] { scatter(scattered, field, store); });
+    }
     reader.context.throwIfCancelled();
-    if (group.contains("grid")) placeGrid(grid, store);
+    if (group.contains("grid"))
+        withPlace(reader, joined(path, {"grid"}), [&] { placeGrid(grid, store); });
     reader.scene.groups[index].instances = std::move(store);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of reading a scene file: assets (scene_assets.cpp), groups (scene_groups.cpp), the rest (scene_file.cpp). Internal.
+// The parts of reading a scene file: assets (scene_assets.cpp), groups (scene_groups.cpp), the rest
+// (scene_file.cpp). Internal.
 #pragma once
 
 #include <scenegraph/io/json.h>
@@ -19,12 +20,12 @@ struct Terrain {
 
 struct SceneReader {
     LoadContext& context;
-    std::string name;                          // as errors call the file
-    std::filesystem::path folder;              // of the file
+    std::string name;              // as errors call the file
+    std::filesystem::path folder;  // of the file
     Scene scene;
     std::map<std::string, ChildRef> children;  // assets and groups by name
     std::map<std::string, Terrain> terrains;
-    std::map<std::string, ChildRef> files;     // assets by path: each file is loaded once
+    std::map<std::string, ChildRef> files;  // assets by path: each file is loaded once
 
     std::string where(const JsonPath& path) const { return name + ": " + jsonPointer(path); }
     [[noreturn]] void fail(const JsonPath& path, const std::string& message) const {
@@ -37,9 +38,20 @@ struct SceneReader {
 // Adds the asset's meshes, materials and textures, and its name.
 void readAsset(SceneReader& reader, const std::string& name, const Json& asset);
 
-// Adds the instances of groups[index], whose name is in reader.children already. instances: the group's explicit ones, which
-// have been taken out of `group` and are not yet validated.
+// Adds the instances of groups[index], whose name is in reader.children already. instances: the
+// group's explicit ones, which have been taken out of `group` and are not yet validated.
 void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Json& instances);
+
+// Calls make(), giving errors about its parameters (kInvalidArgument) a place in the file.
+template <class Make>
+auto withPlace(const SceneReader& reader, const JsonPath& path, const Make& make) {
+    try {
+        return make();
+    } catch (const Error& e) {
+        if (e.code() != ErrorCode::kInvalidArgument) throw;
+        reader.fail(path, e.what());
+    }
+}
 
 // Members of validated objects.
 template <class T>

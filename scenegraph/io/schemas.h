@@ -5,6 +5,7 @@
 namespace stipple {
 
 extern const char* const kSceneSchemaText;  // scenes/scene.schema.json: the scene file, published
-extern const char* const kGltfSchemaText;   // scenegraph/io/gltf.schema.json: what loadGltf reads of a glTF document
+extern const char* const
+    kGltfSchemaText;  // scenegraph/io/gltf.schema.json: what loadGltf reads of a glTF document
 
 }  // namespace stipple

@@ -9,7 +9,9 @@ namespace stipple {
 // From 16 numbers, column by column. False if the last row is not 0 0 0 1.
 inline bool affineFromMatrix(const double* m, Affine& result) {
     constexpr double kTolerance = 1e-6;
-    if (std::max({std::abs(m[3]), std::abs(m[7]), std::abs(m[11]), std::abs(m[15] - 1.0)}) > kTolerance) return false;
+    if (std::max({std::abs(m[3]), std::abs(m[7]), std::abs(m[11]), std::abs(m[15] - 1.0)}) >
+        kTolerance)
+        return false;
     result.linear = DMat3(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
     result.translation = DVec3(m[12], m[13], m[14]);
     return true;
@@ -35,11 +37,12 @@ inline DMat3 rotationFromEuler(const DVec3& angles) {
 }
 
 inline Affine affineFromParts(const DVec3& translation, const DMat3& rotation, const DVec3& scale) {
-    return {DMat3(rotation[0] * scale.x, rotation[1] * scale.y, rotation[2] * scale.z), translation};
+    return {DMat3(rotation[0] * scale.x, rotation[1] * scale.y, rotation[2] * scale.z),
+            translation};
 }
 
-// Flattens what it maps, or as good as: it makes less than 2e-12 of a cube's volume out of it, measured by its longest
-// stretch. (A little stricter than what buildScene() refuses.)
+// Flattens what it maps, or as good as: it makes less than 2e-12 of a cube's volume out of it,
+// measured by its longest stretch. (A little stricter than what buildScene() refuses.)
 inline bool isSingular(const DMat3& m) {
     const double length = maxLengthScale(m);
     return !(std::abs(glm::determinant(m)) > 2e-12 * length * length * length);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <core/parallel.h>
 
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -9,7 +10,8 @@
 namespace stipple {
 
 struct ThreadPool::Impl {
-    explicit Impl(int n) : arena(n), n_threads(n) {}
+    explicit Impl(int n) : limit(tbb::global_control::max_allowed_parallelism, size_t(n) + 1), arena(n), n_threads(n) {}
+    tbb::global_control limit;  // or TBB warns of more threads than cores
     tbb::task_arena arena;
     int n_threads;
 };

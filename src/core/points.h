@@ -85,8 +85,9 @@ struct TriangleBlock {
 class PointSink {
 public:
     virtual ~PointSink() = default;
-    virtual void take(const PointBlock& block) = 0;
-    virtual void take(const TriangleBlock& block) = 0;
+    // False if the sink has no use for any of the block's numbers later.
+    virtual bool take(const PointBlock& block) = 0;
+    virtual bool take(const TriangleBlock& block) = 0;
     // True if nothing within the rectangle at or behind z_min can change the picture of this tile:
     // sources ask before they open a node.
     virtual bool hides(const SubpixelRect& rect, float z_min) = 0;

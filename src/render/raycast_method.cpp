@@ -38,6 +38,7 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
     // A ray stands for its share of the pixel; in perspective it widens with depth.
     const float footprint =
         view.orthographic ? 0.0f : s / float(view.focal) / std::sqrt(float(n_rays));
+    if (request.progress) request.progress("draw", 0.0);
     std::atomic<size_t> done{0};
     std::mutex progress_mutex;
     pool.forEach(size_t(columns) * size_t(rows), [&](size_t t, int) {

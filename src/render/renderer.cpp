@@ -8,6 +8,8 @@
 #include <render/tile_loop.h>
 #include <sampling/random_sampler.h>
 
+#include <cstdio>
+
 namespace stipple {
 
 namespace {
@@ -67,6 +69,7 @@ struct Renderer::Impl {
 
     void drawPoints(const FrameRequest& request, const View& view, Picture& picture,
                     FrameStats& stats) {
+        if (request.progress) request.progress("plan", 0.0);
         const Stopwatch plan_watch;
         const FramePlan& plan = sampler.plan(view, request.settings, pool, request.cancel);
         stats.phases.emplace_back("plan", plan_watch.seconds());
@@ -94,6 +97,7 @@ struct Renderer::Impl {
     void drawRaycast(const FrameRequest& request, const View& view, Picture& picture,
                      FrameStats& stats) {
         if (!caster || caster_origin != view.eye_world) {
+            if (request.progress) request.progress("build", 0.0);
             const Stopwatch build_watch;
             caster.reset();
             caster = makeEmbreeRayCaster(scene, view.eye_world, pool.threadCount());
@@ -114,6 +118,10 @@ Frame Renderer::render(const FrameRequest& request) {
                                request.settings.subpixels);
     const Stopwatch watch;
     Picture picture(view, impl_->scene.lighting, request.aovs, request.transparent);
+    int debug_x = 0, debug_y = 0;
+    const bool is_debugging = std::sscanf(request.debug_pixel.c_str(), "%d,%d", &debug_x, &debug_y) == 2 &&
+                              debug_x >= 0 && debug_y >= 0 && debug_x < view.width && debug_y < view.height;
+    if (is_debugging) picture.watch(debug_x, debug_y);
     switch (request.settings.method) {
         case Method::kPoints:
             impl_->drawPoints(request, view, picture, frame.stats);
@@ -129,6 +137,7 @@ Frame Renderer::render(const FrameRequest& request) {
     for (const auto& [name, seconds] : frame.stats.phases) {
         if (name == "build") frame.stats.seconds -= seconds;
     }
+    if (is_debugging) frame.stats.debug_text = picture.watchedPixel();
     frame.image = std::move(picture.image());
     return frame;
 }

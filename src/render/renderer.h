@@ -29,6 +29,7 @@ struct FrameStats {
     uint64_t small_triangles = 0;  // rasterized in tiles
     double overestimation = 0.0;   // points drawn in the frustum / points needed
     size_t cache_bytes = 0;        // of the point lists
+    std::string debug_text;    // one line on the pixel asked for
 };
 
 struct Frame {
@@ -42,7 +43,7 @@ struct FrameRequest {
     RenderSettings settings;
     bool transparent = false;       // leave the background out; A is coverage
     std::vector<std::string> aovs;  // depth, normal, albedo, object, coverage, count
-    std::string debug_pixel;        // "x,y": print what happens there to stderr
+    std::string debug_pixel;        // "x,y": described in FrameStats::debug_text
     const CancelFlag* cancel = nullptr;
     std::function<void(const char* phase, double fraction)>
         progress;  // may be empty; called from one thread at a time

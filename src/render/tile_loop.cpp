@@ -92,6 +92,7 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
     std::vector<Tile> tiles = makeTiles(context.view, context.settings.tile_size, halo);
     sortIntoTiles(batches, context.view, context.settings.tile_size, halo, tiles);
 
+    if (request.progress) request.progress("draw", 0.0);
     std::vector<Worker> workers(pool.threadCount());
     std::atomic<size_t> done{0};
     std::mutex progress_mutex;
@@ -125,7 +126,7 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
         worker.finish_seconds += finish_watch.seconds();
 
         const size_t n = ++done;
-        if (request.progress && n % 16 == 0) {
+        if (request.progress && n % 4 == 0) {
             const std::lock_guard lock(progress_mutex);
             request.progress("draw", double(n) / double(tiles.size()));
         }

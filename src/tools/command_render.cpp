@@ -134,6 +134,11 @@ RenderSettings effectiveSettings(const RenderOptions& options, const Scene& scen
     for (const auto& [key, value] : scene.render_defaults)
         applySetting(settings, key, value, scene.path);
     options.settings.apply(settings);
+    // Better refused than ignored.
+    if (settings.shadows || settings.ao) {
+        throw Error(ErrorCode::kInvalidArgument, settings.shadows ? "--shadows" : "--ao",
+                    "is not yet available");
+    }
     return settings;
 }
 
@@ -220,6 +225,7 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
         stats.frames.push_back(frame.stats);
         throwIfCancelled(cancel);
     }
+    if (!frame.stats.debug_text.empty()) std::fprintf(stderr, "%s\n", frame.stats.debug_text.c_str());
 
     progress.update("write", 0.0);
     const Stopwatch write_watch;

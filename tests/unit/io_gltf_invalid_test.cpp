@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// glTF files that are wrong, by accident or on purpose: one clear line each, never a crash, a hang or a memory explosion.
+// glTF files that are wrong, by accident or on purpose: one clear line each, never a crash, a hang
+// or a memory explosion.
 #include <gtest/gtest.h>
 
 #include "io_test_support.h"
@@ -11,7 +12,9 @@
 namespace stipple {
 namespace {
 
-std::string errorOf(GltfBuilder& builder, LoadOptions options = {}) { return tryLoadText("t.gltf", builder.gltf(), options).error; }
+std::string errorOf(GltfBuilder& builder, LoadOptions options = {}) {
+    return tryLoadText("t.gltf", builder.gltf(), options).error;
+}
 
 #define EXPECT_STARTS_WITH(text, start) \
     EXPECT_TRUE(std::string(text).starts_with(start)) << "is: " << (text) << "\nnot: " << (start)
@@ -29,22 +32,30 @@ TEST(IoGltfInvalid, checksEveryIndexIntoTheDocument) {
         return errorOf(b);
     };
     EXPECT_STARTS_WITH(with([](Json& j) { j["scene"] = 7; }), "t.gltf: scene: index 7");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["scenes"][0]["nodes"] = {1}; }), "t.gltf: scenes[0].nodes[0]: index 1");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["nodes"][0]["children"] = {3}; }), "t.gltf: nodes[0].children[0]: index 3");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["nodes"][0]["mesh"] = 3; }), "t.gltf: nodes[0].mesh: index 3");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["nodes"][0]["camera"] = 0; }), "t.gltf: nodes[0].camera: index 0");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["scenes"][0]["nodes"] = {1}; }),
+                       "t.gltf: scenes[0].nodes[0]: index 1");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["nodes"][0]["children"] = {3}; }),
+                       "t.gltf: nodes[0].children[0]: index 3");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["nodes"][0]["mesh"] = 3; }),
+                       "t.gltf: nodes[0].mesh: index 3");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["nodes"][0]["camera"] = 0; }),
+                       "t.gltf: nodes[0].camera: index 0");
     EXPECT_STARTS_WITH(with([](Json& j) { j["meshes"][0]["primitives"][0]["material"] = 5; }),
                        "t.gltf: meshes[0].primitives[0].material: index 5");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 5; }),
-                       "t.gltf: meshes[0].primitives[0].attributes.POSITION: index 5");
+    EXPECT_STARTS_WITH(
+        with([](Json& j) { j["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = 5; }),
+        "t.gltf: meshes[0].primitives[0].attributes.POSITION: index 5");
     EXPECT_NE(with([](Json& j) { j["meshes"][0]["primitives"][0]["indices"] = 5; }), "");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["bufferView"] = 9; }), "t.gltf: accessors[0].bufferView: index 9");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["buffer"] = 9; }), "t.gltf: bufferViews[0].buffer: index 9");
-    EXPECT_STARTS_WITH(with([](Json& j) {
-                           j["meshes"][0]["primitives"][0]["material"] = 0;
-                           j["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 4}}}}}}};
-                       }),
-                       "t.gltf: materials[0].pbrMetallicRoughness.baseColorTexture.index: index 4");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["bufferView"] = 9; }),
+                       "t.gltf: accessors[0].bufferView: index 9");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["buffer"] = 9; }),
+                       "t.gltf: bufferViews[0].buffer: index 9");
+    EXPECT_STARTS_WITH(
+        with([](Json& j) {
+            j["meshes"][0]["primitives"][0]["material"] = 0;
+            j["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 4}}}}}}};
+        }),
+        "t.gltf: materials[0].pbrMetallicRoughness.baseColorTexture.index: index 4");
 }
 
 TEST(IoGltfInvalid, checksBoundsOfViewsAndAccessorsWithoutOverflow) {
@@ -53,41 +64,61 @@ TEST(IoGltfInvalid, checksBoundsOfViewsAndAccessorsWithoutOverflow) {
         change(b.json);
         return errorOf(b);
     };
-    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteOffset"] = 1000000; }), "t.gltf: bufferViews[0]: ");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteLength"] = 43; }), "t.gltf: bufferViews[0]: ");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteOffset"] = 18446744073709551615ull; }),
-                       "t.gltf: bufferViews[0].byteOffset: ");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["byteOffset"] = 4; }), "t.gltf: accessors[0]: 3 elements lie beyond");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["count"] = 4; }), "t.gltf: accessors[0]: 4 elements lie beyond");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["count"] = 4294967295u; }), "t.gltf: accessors[0]: ");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["count"] = -1; }), "t.gltf: accessors[0].count: ");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["count"] = 2.5; }), "t.gltf: accessors[0].count: ");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteStride"] = 252; }), "t.gltf: accessors[0]: ");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteStride"] = 8; }), "t.gltf: accessors[0]: byteStride 8 <");
-    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["componentType"] = 5130; }), "t.gltf: accessors[0].componentType: ");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteOffset"] = 1000000; }),
+                       "t.gltf: bufferViews[0]: ");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteLength"] = 43; }),
+                       "t.gltf: bufferViews[0]: ");
+    EXPECT_STARTS_WITH(
+        with([](Json& j) { j["bufferViews"][0]["byteOffset"] = 18446744073709551615ull; }),
+        "t.gltf: bufferViews[0].byteOffset: ");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["byteOffset"] = 4; }),
+                       "t.gltf: accessors[0]: 3 elements lie beyond");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["count"] = 4; }),
+                       "t.gltf: accessors[0]: 4 elements lie beyond");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["count"] = 4294967295u; }),
+                       "t.gltf: accessors[0]: ");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["count"] = -1; }),
+                       "t.gltf: accessors[0].count: ");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["count"] = 2.5; }),
+                       "t.gltf: accessors[0].count: ");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteStride"] = 252; }),
+                       "t.gltf: accessors[0]: ");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["bufferViews"][0]["byteStride"] = 8; }),
+                       "t.gltf: accessors[0]: byteStride 8 <");
+    EXPECT_STARTS_WITH(with([](Json& j) { j["accessors"][0]["componentType"] = 5130; }),
+                       "t.gltf: accessors[0].componentType: ");
 }
 
 TEST(IoGltfInvalid, checksAttributesAgainstEachOther) {
     GltfBuilder b = GltfBuilder::triangle();
     b.primitive()["attributes"]["NORMAL"] = b.addFloats({0, 0, 1, 0, 0, 1}, "VEC3");
-    EXPECT_STARTS_WITH(errorOf(b), "t.gltf: meshes[0].primitives[0].attributes.NORMAL: count 2, but POSITION has 3");
+    EXPECT_STARTS_WITH(
+        errorOf(b),
+        "t.gltf: meshes[0].primitives[0].attributes.NORMAL: count 2, but POSITION has 3");
     GltfBuilder c = GltfBuilder::triangle();
     c.primitive()["attributes"]["POSITION"] = 1;
-    EXPECT_STARTS_WITH(errorOf(c), "t.gltf: meshes[0].primitives[0].attributes.POSITION: accessors[1] has the wrong type");
+    EXPECT_STARTS_WITH(
+        errorOf(c),
+        "t.gltf: meshes[0].primitives[0].attributes.POSITION: accessors[1] has the wrong type");
     GltfBuilder d = GltfBuilder::triangle();
     d.primitive()["indices"] = d.addFloats({0, 1, 2}, "SCALAR");
-    EXPECT_STARTS_WITH(errorOf(d), "t.gltf: meshes[0].primitives[0].indices: accessors[2] is not of unsigned integers");
+    EXPECT_STARTS_WITH(
+        errorOf(d),
+        "t.gltf: meshes[0].primitives[0].indices: accessors[2] is not of unsigned integers");
 }
 
 TEST(IoGltfInvalid, refusesValuesThatAreNotFiniteOrTooLarge) {
-    for (float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30f}) {
+    for (float bad :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30f}) {
         GltfBuilder b = GltfBuilder::triangle();
-        b.primitive()["attributes"]["POSITION"] = b.addFloats({0, 0, 0, 1, 0, 0, 0, bad, 0}, "VEC3");
+        b.primitive()["attributes"]["POSITION"] =
+            b.addFloats({0, 0, 0, 1, 0, 0, 0, bad, 0}, "VEC3");
         EXPECT_STARTS_WITH(errorOf(b), "t.gltf: meshes[0].primitives[0].attributes.POSITION: ");
     }
     GltfBuilder b = GltfBuilder::triangle();
     b.json["nodes"] = Json::array();
-    for (int i = 0; i < 20; ++i) b.json["nodes"].push_back({{"scale", {1e30, 1e30, 1e30}}, {"children", {i + 1}}});
+    for (int i = 0; i < 20; ++i)
+        b.json["nodes"].push_back({{"scale", {1e30, 1e30, 1e30}}, {"children", {i + 1}}});
     b.json["nodes"].push_back({{"mesh", 0}});
     EXPECT_NE(errorOf(b).find("not finite"), std::string::npos);
 }
@@ -96,9 +127,10 @@ TEST(IoGltfInvalid, refusesSparseIndicesOutOfRangeOrOrder) {
     for (const std::vector<uint16_t>& indices : {std::vector<uint16_t>{1, 3}, {1, 1}, {2, 0}}) {
         GltfBuilder b = GltfBuilder::triangle();
         const int at = b.addView(indices), values = b.addView<float>({1, 2, 3, 4, 5, 6});
-        b.json["accessors"][0]["sparse"] = {{"count", 2},
-                                            {"indices", {{"bufferView", at}, {"componentType", 5123}}},
-                                            {"values", {{"bufferView", values}}}};
+        b.json["accessors"][0]["sparse"] = {
+            {"count", 2},
+            {"indices", {{"bufferView", at}, {"componentType", 5123}}},
+            {"values", {{"bufferView", values}}}};
         EXPECT_STARTS_WITH(errorOf(b), "t.gltf: accessors[0].sparse.indices: index ");
     }
 }
@@ -161,12 +193,14 @@ TEST(IoGltfInvalid, keepsFilesInsideTheFolder) {
     folder.write("secret.bin", b.bin);
     std::filesystem::create_directories(folder.path("scene"));
     std::filesystem::create_symlink(folder.path("secret.bin"), folder.path("scene/link.bin"));
-    for (const std::string& uri : {std::string("../secret.bin"), std::string("%2e%2e/secret.bin"), folder.path("secret.bin"),
-                                   std::string("link.bin"), std::string("x/../../secret.bin")}) {
+    for (const std::string& uri :
+         {std::string("../secret.bin"), std::string("%2e%2e/secret.bin"), folder.path("secret.bin"),
+          std::string("link.bin"), std::string("x/../../secret.bin")}) {
         b.json["buffers"] = {{{"byteLength", b.bin.size()}, {"uri", uri}}};
         const std::string path = folder.write("scene/t.gltf", b.gltf());
         const Loaded refused = tryLoad(path);
-        EXPECT_NE(refused.error.find("lies outside of the scene's folder"), std::string::npos) << uri << ": " << refused.error;
+        EXPECT_NE(refused.error.find("lies outside of the scene's folder"), std::string::npos)
+            << uri << ": " << refused.error;
         LoadOptions options;
         options.allow_outside = true;
         EXPECT_EQ(tryLoad(path, options).error.find("lies outside"), std::string::npos) << uri;
@@ -177,8 +211,9 @@ TEST(IoGltfInvalid, refusesUrisThatAreNoFiles) {
     const TempFolder folder;
     GltfBuilder b = GltfBuilder::triangle();
     std::filesystem::create_directories(folder.path("dir.bin"));
-    for (const char* uri : {"http://example.com/a.bin", "data:,x", "data:application/octet-stream;base64,A*AA", "none.bin", "dir.bin", "",
-                            "file:///etc/passwd"}) {
+    for (const char* uri :
+         {"http://example.com/a.bin", "data:,x", "data:application/octet-stream;base64,A*AA",
+          "none.bin", "dir.bin", "", "file:///etc/passwd"}) {
         b.json["buffers"] = {{{"byteLength", b.bin.size()}, {"uri", uri}}};
         EXPECT_STARTS_WITH(tryLoad(folder.write("t.gltf", b.gltf())).error, "t.gltf: buffers[0].");
     }
@@ -192,9 +227,10 @@ TEST(IoGltfInvalid, refusesDamagedAndForeignPictures) {
     b.json["textures"] = {{{"source", 0}}};
     b.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
     const std::string header("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", 16);
-    for (const std::string& bytes : {std::string("not a picture at all"), std::string("x"), header,
-                                     header + std::string("\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x06\0\0\0crc!", 17),
-                                     std::string("\xff\xd8\xff\xe0 and no more of it")}) {
+    for (const std::string& bytes :
+         {std::string("not a picture at all"), std::string("x"), header,
+          header + std::string("\x7f\xff\xff\xff\x7f\xff\xff\xff\x08\x06\0\0\0crc!", 17),
+          std::string("\xff\xd8\xff\xe0 and no more of it")}) {
         b.json["images"] = {{{"uri", "data:image/png;base64," + base64(bytes)}}};
         EXPECT_STARTS_WITH(errorOf(b), "t.gltf: images[0]: ");
     }
@@ -206,7 +242,8 @@ TEST(IoGltfInvalid, refusesRequiredExtensionsAndVersionsByName) {
         b.json["extensionsUsed"] = b.json["extensionsRequired"] = {name};
         const Loaded loaded = tryLoadText("t.gltf", b.gltf());
         EXPECT_EQ(loaded.code, ErrorCode::kUnsupported);
-        EXPECT_EQ(loaded.error, "t.gltf: extensionsRequired: \"" + std::string(name) + "\" is not supported");
+        EXPECT_EQ(loaded.error,
+                  "t.gltf: extensionsRequired: \"" + std::string(name) + "\" is not supported");
     }
     GltfBuilder b = GltfBuilder::triangle();
     b.json["asset"]["version"] = "1.0";
@@ -219,7 +256,8 @@ TEST(IoGltfInvalid, everyPrefixOfABinaryFileIsRefusedWithOneLine) {
     ASSERT_EQ(tryLoad(folder.write("t.glb", whole)).error, "");
     for (size_t n = 0; n < whole.size(); ++n) {
         const Loaded loaded = tryLoad(folder.write("t.glb", whole.substr(0, n)));
-        ASSERT_TRUE(loaded.error.starts_with("t.glb: ")) << "of " << n << " bytes: " << loaded.error;
+        ASSERT_TRUE(loaded.error.starts_with("t.glb: "))
+            << "of " << n << " bytes: " << loaded.error;
         ASSERT_EQ(loaded.error.find('\n'), std::string::npos);
     }
 }
@@ -245,17 +283,19 @@ TEST(IoGltfInvalid, everyValueMayBeReplacedByAnother) {
     GltfBuilder b = GltfBuilder::triangle();
     b.primitive()["attributes"]["NORMAL"] = b.addFloats({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
     b.primitive()["material"] = 0;
-    b.json["materials"] = {{{"alphaMode", "MASK"},
-                            {"emissiveFactor", {0, 0, 1}},
-                            {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 2}}}}},
-                            {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 1}}, {"roughnessFactor", 0.5}}}}};
+    b.json["materials"] = {
+        {{"alphaMode", "MASK"},
+         {"emissiveFactor", {0, 0, 1}},
+         {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 2}}}}},
+         {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 1}}, {"roughnessFactor", 0.5}}}}};
     const int at = b.addView<uint8_t>({1}), values = b.addView<float>({5, 6, 7});
     b.json["accessors"][0]["sparse"] = {{"count", 1},
                                         {"indices", {{"bufferView", at}, {"componentType", 5121}}},
                                         {"values", {{"bufferView", values}}}};
     b.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 1}}}}};
     b.json["nodes"].push_back({{"camera", 0}, {"rotation", {0, 0, 0, 1}}, {"scale", {1, 2, 3}}});
-    b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = b.addFloats({1, 0, 0, 2, 0, 0}, "VEC3");
+    b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] =
+        b.addFloats({1, 0, 0, 2, 0, 0}, "VEC3");
     b.json["scenes"][0]["nodes"].push_back(1);
     const TempFolder folder;
     LoadOptions options;

@@ -36,7 +36,8 @@ GltfBuilder texturedTriangle(const std::string& png) {
     b.primitive()["material"] = 0;
     b.json["images"] = {{{"uri", "data:image/png;base64," + base64(png)}}};
     b.json["textures"] = {{{"source", 0}}};
-    b.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}}}};
+    b.json["materials"] = {
+        {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}}}};
     return b;
 }
 
@@ -51,7 +52,8 @@ std::vector<Vec3> corners(const Mesh& mesh, size_t triangle) {
 TEST(IoGltf, loadsATriangleFromTextAndBinary) {
     for (const bool binary : {false, true}) {
         GltfBuilder b = GltfBuilder::triangle();
-        const Loaded loaded = binary ? tryLoadText("t.glb", b.glb()) : tryLoadText("t.gltf", b.gltf());
+        const Loaded loaded =
+            binary ? tryLoadText("t.glb", b.glb()) : tryLoadText("t.gltf", b.gltf());
         ASSERT_EQ(loaded.error, "");
         const Scene& scene = loaded.scene;
         ASSERT_EQ(scene.meshes.size(), 1u);
@@ -83,7 +85,8 @@ TEST(IoGltf, readsExternalBuffersWithEscapedAndUnicodeNames) {
     const TempFolder folder;
     GltfBuilder b = GltfBuilder::triangle();
     folder.write("data/p\xc5\x99\xc3\xad +vod.bin", b.bin + "trailing bytes are allowed");
-    b.json["buffers"] = {{{"byteLength", b.bin.size()}, {"uri", "data/p%C5%99\xc3\xad%20+vod.bin"}}};
+    b.json["buffers"] = {
+        {{"byteLength", b.bin.size()}, {"uri", "data/p%C5%99\xc3\xad%20+vod.bin"}}};
     EXPECT_EQ(tryLoad(folder.write("\xc5\xa1.gltf", b.gltf())).error, "");
 }
 
@@ -106,11 +109,16 @@ TEST(IoGltf, readsQuantizedPositionsOfAllTypes) {
         return corners(meshOf(load(b)), 0)[1];
     };
     GltfBuilder b = GltfBuilder::triangle();
-    EXPECT_EQ(secondCorner(b, b.add<int8_t>({0, 0, 0, 7, 0, 0, 0, 9, 0}, "VEC3", 5120)), Vec3(7, 0, 0));
-    EXPECT_EQ(secondCorner(b, b.add<int8_t>({0, 0, 0, -128, 0, 0, 0, 9, 0}, "VEC3", 5120, true)), Vec3(-1, 0, 0));
-    EXPECT_EQ(secondCorner(b, b.add<uint8_t>({0, 0, 0, 255, 0, 0, 0, 9, 0}, "VEC3", 5121, true)), Vec3(1, 0, 0));
-    EXPECT_EQ(secondCorner(b, b.add<int16_t>({0, 0, 0, -300, 0, 0, 0, 9, 0}, "VEC3", 5122)), Vec3(-300, 0, 0));
-    EXPECT_EQ(secondCorner(b, b.add<uint16_t>({0, 0, 0, 65535, 0, 0, 0, 9, 0}, "VEC3", 5123, true)), Vec3(1, 0, 0));
+    EXPECT_EQ(secondCorner(b, b.add<int8_t>({0, 0, 0, 7, 0, 0, 0, 9, 0}, "VEC3", 5120)),
+              Vec3(7, 0, 0));
+    EXPECT_EQ(secondCorner(b, b.add<int8_t>({0, 0, 0, -128, 0, 0, 0, 9, 0}, "VEC3", 5120, true)),
+              Vec3(-1, 0, 0));
+    EXPECT_EQ(secondCorner(b, b.add<uint8_t>({0, 0, 0, 255, 0, 0, 0, 9, 0}, "VEC3", 5121, true)),
+              Vec3(1, 0, 0));
+    EXPECT_EQ(secondCorner(b, b.add<int16_t>({0, 0, 0, -300, 0, 0, 0, 9, 0}, "VEC3", 5122)),
+              Vec3(-300, 0, 0));
+    EXPECT_EQ(secondCorner(b, b.add<uint16_t>({0, 0, 0, 65535, 0, 0, 0, 9, 0}, "VEC3", 5123, true)),
+              Vec3(1, 0, 0));
 }
 
 TEST(IoGltf, readsInterleavedAttributes) {
@@ -119,8 +127,11 @@ TEST(IoGltf, readsInterleavedAttributes) {
     const int view = b.addView<float>({0, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0, 2, 0, 1, 0, 0, 0, 2});
     b.json["bufferViews"][view]["byteStride"] = 24;
     for (int i = 0; i < 2; ++i) {
-        b.json["accessors"].push_back(
-            {{"bufferView", view}, {"byteOffset", 12 * i}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}});
+        b.json["accessors"].push_back({{"bufferView", view},
+                                       {"byteOffset", 12 * i},
+                                       {"componentType", 5126},
+                                       {"count", 3},
+                                       {"type", "VEC3"}});
         b.primitive()["attributes"][i ? "NORMAL" : "POSITION"] = b.json["accessors"].size() - 1;
     }
     const Loaded loaded = load(b);
@@ -139,11 +150,13 @@ TEST(IoGltf, fillsInSparseAccessors) {
     EXPECT_EQ(corners(meshOf(load(b)), 0)[1], Vec3(5, 6, 7));
     // Without a buffer view the others are zero.
     GltfBuilder c = GltfBuilder::triangle();
-    const int three = c.addView<uint16_t>({0, 1, 2}), all = c.addView<float>({1, 1, 1, 2, 1, 1, 1, 2, 1});
+    const int three = c.addView<uint16_t>({0, 1, 2}),
+              all = c.addView<float>({1, 1, 1, 2, 1, 1, 1, 2, 1});
     c.json["accessors"][0].erase("bufferView");
-    c.json["accessors"][0]["sparse"] = {{"count", 3},
-                                        {"indices", {{"bufferView", three}, {"componentType", 5123}}},
-                                        {"values", {{"bufferView", all}}}};
+    c.json["accessors"][0]["sparse"] = {
+        {"count", 3},
+        {"indices", {{"bufferView", three}, {"componentType", 5123}}},
+        {"values", {{"bufferView", all}}}};
     EXPECT_EQ(corners(meshOf(load(c)), 0)[1], Vec3(2, 1, 1));
 }
 
@@ -197,7 +210,8 @@ TEST(IoGltf, givesFlatNormalsToPrimitivesThatLackThemIfOthersHaveThem) {
 TEST(IoGltf, vertexColoursOfThreeComponentsAreOpaqueAndOthersWhite) {
     GltfBuilder b = GltfBuilder::triangle();
     Json coloured = b.primitive();
-    coloured["attributes"]["COLOR_0"] = b.add<uint8_t>({255, 0, 51, 0, 255, 0, 0, 0, 255}, "VEC3", 5121, true);
+    coloured["attributes"]["COLOR_0"] =
+        b.add<uint8_t>({255, 0, 51, 0, 255, 0, 0, 0, 255}, "VEC3", 5121, true);
     b.json["meshes"][0]["primitives"].push_back(coloured);
     const Loaded loaded = load(b);
     const Mesh& mesh = meshOf(loaded);
@@ -210,8 +224,9 @@ TEST(IoGltf, vertexColoursOfThreeComponentsAreOpaqueAndOthersWhite) {
 TEST(IoGltf, composesNestedTransforms) {
     GltfBuilder b = GltfBuilder::triangle();
     const double h = std::sqrt(0.5);
-    b.json["nodes"] = {{{"translation", {10, 0, 0}}, {"rotation", {0, 0, h, h}}, {"children", {1}}},
-                       {{"matrix", {2, 0, 0, 0, 0, 3, 0, 0, 0, 0, -1, 0, 1, 2, 3, 1}}, {"mesh", 0}}};
+    b.json["nodes"] = {
+        {{"translation", {10, 0, 0}}, {"rotation", {0, 0, h, h}}, {"children", {1}}},
+        {{"matrix", {2, 0, 0, 0, 0, 3, 0, 0, 0, 0, -1, 0, 1, 2, 3, 1}}, {"mesh", 0}}};
     const Loaded loaded = load(b);
     const Group& root = loaded.scene.groups[loaded.scene.root];
     ASSERT_EQ(root.instances.size(), 1u);
@@ -241,7 +256,9 @@ TEST(IoGltf, choosesTheDefaultSceneOrTheFirstOrAllRoots) {
 
 TEST(IoGltf, sharesMeshesOfNodesAndNodesOfSeveralParents) {
     GltfBuilder b = GltfBuilder::triangle();
-    b.json["nodes"] = {{{"children", {2}}, {"translation", {1, 0, 0}}}, {{"children", {2}}, {"scale", {2, 2, 2}}}, {{"mesh", 0}}};
+    b.json["nodes"] = {{{"children", {2}}, {"translation", {1, 0, 0}}},
+                       {{"children", {2}}, {"scale", {2, 2, 2}}},
+                       {{"mesh", 0}}};
     b.json["scenes"][0]["nodes"] = {0, 1};
     const Loaded loaded = load(b);
     EXPECT_EQ(loaded.scene.meshes.size(), 1u);
@@ -264,12 +281,14 @@ TEST(IoGltf, placesGpuInstances) {
     const int t = b.addFloats({1, 0, 0, 2, 0, 0}, "VEC3");
     const int r = b.add<int8_t>({0, 0, 127, 0, 0, 0, 0, 127}, "VEC4", 5120, true);
     const int s = b.addFloats({2, 2, 2, 1, 3, 1}, "VEC3");
-    b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {{"TRANSLATION", t}, {"ROTATION", r}, {"SCALE", s}};
+    b.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+        {"TRANSLATION", t}, {"ROTATION", r}, {"SCALE", s}};
     const Loaded loaded = load(b);
     const Group& root = loaded.scene.groups[loaded.scene.root];
     ASSERT_EQ(root.instances.size(), 2u);
     DBox3 points;
-    for (size_t i = 0; i < 2; ++i) points.extend(root.instances.groupFromChild(i).point(DVec3(1, 1, 0)));
+    for (size_t i = 0; i < 2; ++i)
+        points.extend(root.instances.groupFromChild(i).point(DVec3(1, 1, 0)));
     // Half a turn about z and scale 2 at x = 1: (-1, -2); scale (1, 3, 1) at x = 2: (3, 3).
     EXPECT_NEAR(points.min.x, -1, 1e-5);
     EXPECT_NEAR(points.min.y, -2, 1e-5);
@@ -281,14 +300,17 @@ TEST(IoGltf, placesGpuInstances) {
 TEST(IoGltf, mapsMetallicRoughnessToPhong) {
     GltfBuilder b = GltfBuilder::triangle();
     b.primitive()["material"] = 0;
-    b.json["materials"] = {{{"name", "m"},
-                            {"alphaMode", "MASK"},
-                            {"alphaCutoff", 0.25},
-                            {"doubleSided", true},
-                            {"emissiveFactor", {0.5, 0, 1}},
-                            {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 4}}}}},
-                            {"pbrMetallicRoughness",
-                             {{"baseColorFactor", {0.8, 0.4, 0.2, 0.5}}, {"metallicFactor", 0.25}, {"roughnessFactor", 0.5}}}}};
+    b.json["materials"] = {
+        {{"name", "m"},
+         {"alphaMode", "MASK"},
+         {"alphaCutoff", 0.25},
+         {"doubleSided", true},
+         {"emissiveFactor", {0.5, 0, 1}},
+         {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 4}}}}},
+         {"pbrMetallicRoughness",
+          {{"baseColorFactor", {0.8, 0.4, 0.2, 0.5}},
+           {"metallicFactor", 0.25},
+           {"roughnessFactor", 0.5}}}}};
     const Material m = load(b).scene.materials.at(0);
     EXPECT_NEAR(m.base_color.r, 0.6f, 1e-6f);
     EXPECT_NEAR(m.specular.g, 0.04f * 0.75f + 0.4f * 0.25f, 1e-6f);
@@ -330,13 +352,15 @@ TEST(IoGltf, loadsBaseTexturesWithTheirSampler) {
 
 TEST(IoGltf, expandsGreyPictures) {
     GltfBuilder b = texturedTriangle(pngBytes({10, 200}, 1));
-    EXPECT_EQ(load(b).scene.textures[0].levels[0].rgba, (std::vector<uint8_t>{10, 10, 10, 255, 200, 200, 200, 255}));
+    EXPECT_EQ(load(b).scene.textures[0].levels[0].rgba,
+              (std::vector<uint8_t>{10, 10, 10, 255, 200, 200, 200, 255}));
 }
 
 TEST(IoGltf, readsPicturesFromFilesAndBufferViews) {
     const std::string png = pngBytes({1, 2, 3, 255});
     GltfBuilder b = texturedTriangle(png);
-    b.json["images"][0] = {{"bufferView", b.addView(std::vector<char>(png.begin(), png.end()))}, {"mimeType", "image/png"}};
+    b.json["images"][0] = {{"bufferView", b.addView(std::vector<char>(png.begin(), png.end()))},
+                           {"mimeType", "image/png"}};
     EXPECT_EQ(tryLoadText("t.glb", b.glb()).error, "");
     const TempFolder folder;
     folder.write("textures/leaf 1.png", png);
@@ -346,13 +370,15 @@ TEST(IoGltf, readsPicturesFromFilesAndBufferViews) {
 
 TEST(IoGltf, otherTexturesCountByTheirMean) {
     GltfBuilder b = texturedTriangle(pngBytes({0, 0, 0, 255, 0, 255, 255, 255}));
-    b.json["materials"][0]["pbrMetallicRoughness"] = {{"metallicRoughnessTexture", {{"index", 0}}}, {"roughnessFactor", 0.5}};
+    b.json["materials"][0]["pbrMetallicRoughness"] = {{"metallicRoughnessTexture", {{"index", 0}}},
+                                                      {"roughnessFactor", 0.5}};
     b.json["materials"][0]["emissiveFactor"] = {1, 1, 1};
     b.json["materials"][0]["emissiveTexture"] = {{"index", 0}};
     const Loaded loaded = load(b);
     const Material& m = loaded.scene.materials[0];
-    EXPECT_NEAR(m.base_color.r, 0.5f, 1e-5f);                                   // metallic 1 x 0.5
-    EXPECT_NEAR(m.shininess, 2.0f / (0.25f * 0.25f * 0.25f * 0.25f) - 2.0f, 0.5f);  // roughness 0.5 x 0.5
+    EXPECT_NEAR(m.base_color.r, 0.5f, 1e-5f);  // metallic 1 x 0.5
+    EXPECT_NEAR(m.shininess, 2.0f / (0.25f * 0.25f * 0.25f * 0.25f) - 2.0f,
+                0.5f);  // roughness 0.5 x 0.5
     EXPECT_NEAR(m.emissive.g, 0.5f, 1e-5f);
     EXPECT_EQ(m.emissive.r, 0.0f);
 }
@@ -361,8 +387,10 @@ TEST(IoGltf, bakesTextureTransformsIntoUvs) {
     GltfBuilder b = texturedTriangle(pngBytes({1, 2, 3, 255}));
     b.primitive()["attributes"]["TEXCOORD_1"] = b.addFloats({1, 0, 0, 1, 1, 1}, "VEC2");
     b.json["extensionsUsed"] = {"KHR_texture_transform"};
-    // The lower left quarter of the picture, turned clockwise by 90 degrees (the specification's example).
-    b.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"]["KHR_texture_transform"] = {
+    // The lower left quarter of the picture, turned clockwise by 90 degrees (the specification's
+    // example).
+    b.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"]
+          ["KHR_texture_transform"] = {
         {"offset", {0, 1}}, {"rotation", kPi / 2}, {"scale", {0.5, 0.5}}, {"texCoord", 1}};
     const Loaded loaded = load(b);
     const auto& uvs = meshOf(loaded).uvs;
@@ -377,18 +405,23 @@ TEST(IoGltf, bakesTextureTransformsIntoUvs) {
 
 TEST(IoGltf, addsCamerasAndDirectionalLights) {
     GltfBuilder b = GltfBuilder::triangle();
-    b.json["cameras"] = {{{"type", "perspective"}, {"name", "eye"}, {"perspective", {{"yfov", 0.5}, {"znear", 0.1}, {"zfar", 50}}}},
-                         {{"type", "orthographic"}, {"orthographic", {{"xmag", 2}, {"ymag", 3}, {"znear", 1}, {"zfar", 9}}}}};
+    b.json["cameras"] = {{{"type", "perspective"},
+                          {"name", "eye"},
+                          {"perspective", {{"yfov", 0.5}, {"znear", 0.1}, {"zfar", 50}}}},
+                         {{"type", "orthographic"},
+                          {"orthographic", {{"xmag", 2}, {"ymag", 3}, {"znear", 1}, {"zfar", 9}}}}};
     const double h = std::sqrt(0.5);
     // Turned by 90 degrees about y: looks along -x.
-    b.json["nodes"] = {{{"mesh", 0}},
-                       {{"camera", 0}, {"translation", {1, 2, 3}}, {"rotation", {0, h, 0, h}}},
-                       {{"camera", 1}, {"name", "top"}},
-                       {{"camera", 0}},
-                       {{"rotation", {0, h, 0, h}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}}};
+    b.json["nodes"] = {
+        {{"mesh", 0}},
+        {{"camera", 0}, {"translation", {1, 2, 3}}, {"rotation", {0, h, 0, h}}},
+        {{"camera", 1}, {"name", "top"}},
+        {{"camera", 0}},
+        {{"rotation", {0, h, 0, h}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}}};
     b.json["scenes"][0]["nodes"] = {0, 1, 2, 3, 4};
     b.json["extensionsUsed"] = {"KHR_lights_punctual"};
-    b.json["extensions"]["KHR_lights_punctual"]["lights"] = {{{"type", "directional"}, {"color", {1, 0.5, 0}}, {"intensity", 2}}};
+    b.json["extensions"]["KHR_lights_punctual"]["lights"] = {
+        {{"type", "directional"}, {"color", {1, 0.5, 0}}, {"intensity", 2}}};
     const Loaded loaded = load(b);
     const auto& cameras = loaded.scene.cameras;
     ASSERT_EQ(cameras.size(), 4u);
@@ -406,7 +439,8 @@ TEST(IoGltf, addsCamerasAndDirectionalLights) {
     EXPECT_TRUE(top->orthographic);
     EXPECT_EQ(top->height, 6.0);
     ASSERT_EQ(loaded.scene.lighting.suns.size(), 1u);
-    EXPECT_NEAR(glm::length(loaded.scene.lighting.suns[0].direction_to_light - Vec3(1, 0, 0)), 0.0f, 1e-6f);
+    EXPECT_NEAR(glm::length(loaded.scene.lighting.suns[0].direction_to_light - Vec3(1, 0, 0)), 0.0f,
+                1e-6f);
     EXPECT_NEAR(loaded.scene.lighting.suns[0].irradiance.g, 1.0f, 1e-6f);
 }
 
@@ -415,7 +449,8 @@ TEST(IoGltf, warnsOnceOfExtensionsItDoesNotKnow) {
     b.json["extensionsUsed"] = {"KHR_materials_clearcoat", "KHR_mesh_quantization"};
     const Loaded loaded = load(b);
     ASSERT_EQ(loaded.diagnostics.warnings.size(), 1u);
-    EXPECT_NE(loaded.diagnostics.warnings[0].find("\"KHR_materials_clearcoat\" is ignored"), std::string::npos);
+    EXPECT_NE(loaded.diagnostics.warnings[0].find("\"KHR_materials_clearcoat\" is ignored"),
+              std::string::npos);
 }
 
 }  // namespace

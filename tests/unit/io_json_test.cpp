@@ -22,7 +22,8 @@ TEST(IoJson, readsAllKindsOfValues) {
 }
 
 TEST(IoJson, namesLineAndColumnOfASyntaxError) {
-    EXPECT_TRUE(parseError("{\n  \"a\": 1,\n  \"b\" 2\n}").starts_with("f: line 3, column 7: not valid JSON: syntax error"));
+    EXPECT_TRUE(parseError("{\n  \"a\": 1,\n  \"b\" 2\n}")
+                    .starts_with("f: line 3, column 7: not valid JSON: syntax error"));
     EXPECT_TRUE(parseError("").starts_with("f: line 1, column 1: "));
     EXPECT_NE(parseError("[1e999]").find("overflow"), std::string::npos);
     EXPECT_NE(parseError("{} x"), "");
@@ -42,7 +43,9 @@ TEST(IoJson, errorsStayOneLine) {
     const std::string error = parseError("{\"a\": \"line\nbreak\"}");
     EXPECT_NE(error, "");
     EXPECT_EQ(error.find('\n'), std::string::npos);
-    EXPECT_EQ(oneLine("a\nb\tc\x01" "d"), "a b c d");
+    EXPECT_EQ(oneLine("a\nb\tc\x01"
+                      "d"),
+              "a b c d");
     EXPECT_EQ(oneLine("\xc3\xa9\xc3\xa9", 3), "\xc3\xa9...");  // no half characters
 }
 
