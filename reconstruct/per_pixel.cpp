@@ -121,7 +121,9 @@ bool DepthPass::splat(DepthTile& tile, float sub_x, float sub_y, float depth, ui
     return is_used;
 }
 
-uint64_t fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
+namespace {
+
+uint64_t fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
     const int width = tile.rect().width(), height = tile.rect().height(), w = tile.stride();
     scratch = tile.keys();
     uint64_t changed = 0;
@@ -154,6 +156,14 @@ uint64_t fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
         }
     }
     return changed;
+}
+
+}  // namespace
+
+uint64_t fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
+    // Again for holes of three subpixels and more, whose ends the first time closes.
+    const uint64_t changed = fillOnce(tile, scratch);
+    return changed > 0 ? changed + fillOnce(tile, scratch) : 0;
 }
 
 namespace {

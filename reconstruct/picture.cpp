@@ -50,10 +50,12 @@ std::string Picture::watchedPixel() const {
     const float* rgb = image_.pixel(watched_x_, watched_y_);
     char line[512];
     std::snprintf(line, sizeof line,
-                  "pixel %d,%d: linear RGB %.5g %.5g %.5g; %g of %g samples covered; depth mean %.6g, nearest %.6g, "
+                  "pixel %d,%d: linear RGB %.5g %.5g %.5g; %g of %g samples covered; depth mean "
+                  "%.6g, nearest %.6g, "
                   "farthest %.6g; albedo %.3g %.3g %.3g; object %u; %g points",
-                  watched_x_, watched_y_, rgb[0], rgb[1], rgb[2], s.covered, s.samples, s.depth / n, s.nearest,
-                  s.depth_max, s.albedo.x / n, s.albedo.y / n, s.albedo.z / n, s.object, s.points);
+                  watched_x_, watched_y_, rgb[0], rgb[1], rgb[2], s.covered, s.samples, s.depth / n,
+                  s.nearest, s.depth_max, s.albedo.x / n, s.albedo.y / n, s.albedo.z / n, s.object,
+                  s.points);
     return line;
 }
 

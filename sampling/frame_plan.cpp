@@ -123,7 +123,7 @@ private:
         draw.range_count = range_count;
         plan.raster.draws.push_back(draw);
         plan.raster_instances.push_back(
-            {makeInstanceFrame(view_, p.camera_from_child, p.path), p.child.index()});
+            {makeInstanceFrame(p.camera_from_child, p.path), p.child.index()});
     }
 
     void addBatch(const Pending& p, const BoxProjection& box, double expected_area) {

@@ -2,7 +2,6 @@
 // One instance as seen from the eye: all that drawing its points and triangles needs.
 #pragma once
 
-#include <core/camera.h>
 #include <core/math.h>
 
 namespace stipple {
@@ -19,18 +18,22 @@ struct InstanceFrame {
     uint64_t path = 0;  // hash of the instance path
 };
 
-inline InstanceFrame makeInstanceFrame(const View& view, const Affine& camera_from_object,
-                                       uint64_t path) {
+inline InstanceFrame makeInstanceFrame(const Affine& camera_from_object, uint64_t path) {
     InstanceFrame f;
     f.camera_from_object = camera_from_object;
-    const double determinant = glm::determinant(camera_from_object.linear);
+    const DMat3& linear = camera_from_object.linear;
+    DMat3 area_map = cofactor(linear);
+    const double determinant = glm::dot(linear[0], area_map[0]);
     f.volume_scale = std::abs(determinant);
-    f.area_scale = maxAreaScale(camera_from_object.linear);
-    f.eye_object = glm::inverse(camera_from_object.linear) * -camera_from_object.translation;
-    const double sign = determinant < 0.0 ? -1.0 : 1.0;
-    const DMat3 area_map = cofactor(camera_from_object.linear) * sign;
-    f.world_from_normal = Mat3(glm::transpose(view.camera_from_world) * area_map / f.area_scale);
-    f.facing = glm::transpose(area_map) * DVec3(0.0, 0.0, 1.0);
+    f.area_scale = maxAreaScale(linear);
+    // The inverse is the transposed cofactor matrix over the determinant.
+    const DVec3& t = camera_from_object.translation;
+    f.eye_object =
+        DVec3(glm::dot(area_map[0], t), glm::dot(area_map[1], t), glm::dot(area_map[2], t)) /
+        -determinant;
+    area_map *= determinant < 0.0 ? -1.0 : 1.0;
+    f.camera_from_normal = Mat3(area_map / f.area_scale);
+    f.facing = DVec3(area_map[0].z, area_map[1].z, area_map[2].z);
     f.path = path;
     return f;
 }

@@ -16,7 +16,8 @@ enum class NodeClass { kOpen, kPoints, kTriangles, kLargeTriangles };
 inline constexpr double kFewPoints = 16.0;
 // Larger runs of large triangles are opened to find parts outside the frustum.
 inline constexpr uint32_t kCullTriangles = 4096;
-// A group's node with more points than this per subpixel is opened: most of it hides behind its own front.
+// A group's node with more points than this per subpixel is opened: most of it hides behind its own
+// front.
 inline constexpr double kMostOverdraw = 8.0;
 // A batch is drawn anew in each tile it touches, so what is drawn as points is opened to this share
 // of a tile.

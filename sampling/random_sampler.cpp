@@ -26,6 +26,12 @@ Vec2 intersectPlane(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& ori
     return {u, std::clamp(glm::dot(direction, q) * inverse, 0.0f, 1.0f - u)};
 }
 
+// Unit normal in world space.
+Vec3 worldNormal(const View& view, const Mat3& camera_from_normal, const Vec3& n_object) {
+    return glm::normalize(Mat3(glm::transpose(view.camera_from_world)) *
+                          (camera_from_normal * n_object));
+}
+
 // Attributes of a triangle of an instance where the ray through sub_x, sub_y meets it at
 // sample.depth.
 void triangleAttributes(const Scene& scene, const View& view, const InstanceFrame& frame,
@@ -44,7 +50,7 @@ void triangleAttributes(const Scene& scene, const View& view, const InstanceFram
         (view.orthographic ? 1.0f : sample.depth) / float(view.focal * std::sqrt(frame.area_scale));
     const MeshSurface surface =
         surfaceAt(mesh, scene.materials, scene.textures, triangle, uv.x, uv.y, footprint);
-    sample.normal_world = glm::normalize(frame.world_from_normal * surface.normal_object);
+    sample.normal_world = worldNormal(view, frame.camera_from_normal, surface.normal_object);
     sample.albedo = surface.albedo;
     sample.material = mesh.triangle_material[triangle];
     sample.object = objectId(frame.path);
@@ -81,8 +87,8 @@ public:
         ListBlock scratch;
         const ListBlock& block =
             lists_.points(run.mesh, run.node, index, 1, run.list_length, scratch, lane);
-        sample.normal_world =
-            glm::normalize(run.world_from_normal * unpackOctahedral(block.shading_normal[lane]));
+        sample.normal_world = worldNormal(view_, run.camera_from_normal,
+                                          unpackOctahedral(block.shading_normal[lane]));
         sample.albedo = unpackSrgb8(block.albedo[lane]);
         sample.material = block.material[lane];
         sample.object = run.object;
@@ -98,7 +104,7 @@ private:
 
     // What attributes() must know of up to 64 consecutive numbers.
     struct Run {
-        Mat3 world_from_normal = Mat3(1.0f);
+        Mat3 camera_from_normal = Mat3(1.0f);
         uint32_t mesh = 0, node = 0;
         uint32_t first_index = 0;  // of the node's list, or of the mesh's triangles
         uint32_t list_length = 0;
@@ -186,7 +192,7 @@ private:
     void drawInstance(uint32_t mesh_index, uint32_t node_index, const Affine& camera_from_object,
                       uint64_t path) {
         if (scene_.meshes[mesh_index].triangles.empty()) return;
-        const InstanceFrame frame = makeInstanceFrame(view_, camera_from_object, path);
+        const InstanceFrame frame = makeInstanceFrame(camera_from_object, path);
         uint32_t triangle_frame = kNotTriangles;
         const BoxProjection box =
             projectBox(view_, camera_from_object.linear, camera_from_object.translation,
@@ -421,7 +427,7 @@ private:
                             std::min(target / area_scale, scene_.groups[child.index()].area),
                             index);
             } else {
-                emitRun(makeInstanceFrame(view_, camera_from_child, child_path), child.index(), 0,
+                emitRun(makeInstanceFrame(camera_from_child, child_path), child.index(), 0,
                         childDensity(scale * area_scale), index, 1);
             }
             return;
@@ -436,8 +442,8 @@ private:
         const uint32_t length = uint32_t(settings_.list_length);
         const uint32_t first =
             piece * 2 <= length ? uint32_t(path >> 8) % (length / piece) * piece : 0;
-        emitRun(makeInstanceFrame(view_, camera_from_object, path), mesh, 0, childDensity(scale),
-                first, count);
+        emitRun(makeInstanceFrame(camera_from_object, path), mesh, 0, childDensity(scale), first,
+                count);
     }
 
     // Points [first, first + count) of a mesh node of one instance. density: drawn points per m^2
@@ -458,7 +464,7 @@ private:
         fillGains(frame, mesh, node, density, params);
 
         Run run;
-        run.world_from_normal = frame.world_from_normal;
+        run.camera_from_normal = frame.camera_from_normal;
         run.mesh = mesh_index;
         run.node = node_index;
         run.list_length = params.random ? 0 : listLength(first + count);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vegetation, rocks and terrain made from a seed. Everything is a pure function of its parameters: the same on every machine.
-// Parameters out of range throw kInvalidArgument.
+// Vegetation, rocks and terrain made from a seed. Everything is a pure function of its parameters:
+// the same on every machine. Parameters out of range throw kInvalidArgument.
 #pragma once
 
 #include <core/material.h>
@@ -12,7 +12,8 @@
 
 namespace stipple {
 
-// A mesh and the materials its triangle_material indexes (loaders append them to the scene and shift the indices).
+// A mesh and the materials its triangle_material indexes (loaders append them to the scene and
+// shift the indices).
 struct GeneratedMesh {
     Mesh mesh;  // not yet built (see buildMesh)
     std::vector<Material> materials;
@@ -21,36 +22,37 @@ struct GeneratedMesh {
 struct TreeParams {
     std::string species = "oak";  // oak, birch, spruce, pine
     uint64_t seed = 1;
-    double height = 0.0;          // metres; 0: the species' own
-    int triangles = 20000;        // about this many (within 10 %), 1000..2000000
+    double height = 0.0;    // metres; 0: the species' own
+    int triangles = 20000;  // about this many (within 10 %), 1000..2000000
 };
-// The trunk stands at the origin, the highest leaf is at `height`, roots reach a little below y = 0. About 10 ms for 20 000 triangles.
+// The trunk stands at the origin, the highest leaf is at `height`, roots reach a little below y =
+// 0. About 10 ms for 20 000 triangles.
 GeneratedMesh makeTree(const TreeParams& params);
 std::vector<std::string> treeSpecies();
 
 struct GrassParams {
     uint64_t seed = 1;
-    double height = 0.35;         // metres, of the longest blades
-    double radius = 0.5;          // metres, of the tuft
+    double height = 0.35;  // metres, of the longest blades
+    double radius = 0.5;   // metres, of the tuft
     int blades = 120;
 };
 GeneratedMesh makeGrass(const GrassParams& params);
 
 struct RockParams {
     uint64_t seed = 1;
-    double radius = 1.0;          // metres
-    int subdivisions = 4;         // 20 * 4^n triangles
+    double radius = 1.0;   // metres
+    int subdivisions = 4;  // 20 * 4^n triangles
 };
 GeneratedMesh makeRock(const RockParams& params);
 
 // Heights on a square grid centred on the origin, bilinear between.
 struct HeightField {
-    int resolution = 0;           // samples along a side
-    double size = 0.0;            // metres along a side
-    std::vector<float> heights;   // resolution^2, metres, row = z, column = x
+    int resolution = 0;          // samples along a side
+    double size = 0.0;           // metres along a side
+    std::vector<float> heights;  // resolution^2, metres, row = z, column = x
 
-    double height(double x, double z) const;   // clamped to the border outside
-    Vec3 normal(double x, double z) const;     // unit
+    double height(double x, double z) const;  // clamped to the border outside
+    Vec3 normal(double x, double z) const;    // unit
 };
 
 struct TerrainParams {
@@ -59,14 +61,15 @@ struct TerrainParams {
     int resolution = 513;         // samples along a side: 2 (resolution - 1)^2 triangles
     double relief = 60.0;         // metres: heights span exactly 0..relief
     double feature_size = 400.0;  // metres, of the largest hills
-    std::string style = "meadow"; // meadow (green, rock where steep), forest_floor, mountain (rock, snow on top)
+    std::string style =
+        "meadow";  // meadow (green, rock where steep), forest_floor, mountain (rock, snow on top)
 };
 HeightField makeHeightField(const TerrainParams& params);
 // The height field as a mesh with smooth normals, coloured by height and slope.
 GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field);
 
-// A simple body for test scenes: "sphere" (diameter 1), "box" (side 1), "plane" (side 1, facing +y), "torus", all centred on the
-// origin, tessellated into about `triangles` triangles.
+// A simple body for test scenes: "sphere" (diameter 1), "box" (side 1), "plane" (side 1, facing
+// +y), "torus", all centred on the origin, tessellated into about `triangles` triangles.
 GeneratedMesh makePrimitive(const std::string& kind, int triangles, const Vec3& color);
 
 }  // namespace stipple

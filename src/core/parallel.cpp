@@ -10,7 +10,10 @@
 namespace stipple {
 
 struct ThreadPool::Impl {
-    explicit Impl(int n) : limit(tbb::global_control::max_allowed_parallelism, size_t(n) + 1), arena(n), n_threads(n) {}
+    explicit Impl(int n)
+        : limit(tbb::global_control::max_allowed_parallelism, size_t(n) + 1),
+          arena(n),
+          n_threads(n) {}
     tbb::global_control limit;  // or TBB warns of more threads than cores
     tbb::task_arena arena;
     int n_threads;

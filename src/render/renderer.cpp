@@ -119,8 +119,9 @@ Frame Renderer::render(const FrameRequest& request) {
     const Stopwatch watch;
     Picture picture(view, impl_->scene.lighting, request.aovs, request.transparent);
     int debug_x = 0, debug_y = 0;
-    const bool is_debugging = std::sscanf(request.debug_pixel.c_str(), "%d,%d", &debug_x, &debug_y) == 2 &&
-                              debug_x >= 0 && debug_y >= 0 && debug_x < view.width && debug_y < view.height;
+    const bool is_debugging =
+        std::sscanf(request.debug_pixel.c_str(), "%d,%d", &debug_x, &debug_y) == 2 &&
+        debug_x >= 0 && debug_y >= 0 && debug_x < view.width && debug_y < view.height;
     if (is_debugging) picture.watch(debug_x, debug_y);
     switch (request.settings.method) {
         case Method::kPoints:

@@ -29,7 +29,7 @@ struct FrameStats {
     uint64_t small_triangles = 0;  // rasterized in tiles
     double overestimation = 0.0;   // points drawn in the frustum / points needed
     size_t cache_bytes = 0;        // of the point lists
-    std::string debug_text;    // one line on the pixel asked for
+    std::string debug_text;        // one line on the pixel asked for
 };
 
 struct Frame {
