@@ -11,8 +11,7 @@ struct InstanceFrame {
     DVec3 eye_object = DVec3(0.0);  // the eye (orthographic: the camera's origin) in object space
     double volume_scale = 1.0;      // |determinant| of camera_from_object.linear
     double area_scale = 1.0;        // largest area scale
-    Mat3 world_from_normal =
-        Mat3(1.0f);  // takes object-space normals to world space (not normalized)
+    Mat3 camera_from_normal = Mat3(1.0f);  // takes object-space normals to camera space (not unit)
     DVec3 facing =
         DVec3(0.0);     // orthographic: prj(n) = f^2 |n . facing| for a unit area with normal n
     uint64_t path = 0;  // hash of the instance path

@@ -13,8 +13,8 @@ std::vector<uint32_t> childrenFirst(const Scene& scene) {
     const size_t n = scene.groups.size();
     // Distinct child groups of each group.
     std::vector<std::vector<uint32_t>> children(n);
+    std::vector<size_t> seen_by(n, n);
     for (size_t g = 0; g < n; ++g) {
-        std::vector<bool> seen(n, false);
         const InstanceStore& instances = scene.groups[g].instances;
         for (size_t i = 0; i < instances.size(); ++i) {
             const ChildRef child = instances.child(i);
@@ -23,8 +23,8 @@ std::vector<uint32_t> childrenFirst(const Scene& scene) {
                 throw Error(ErrorCode::kInvalidScene, scene.path,
                             "group \"" + scene.groups[g].name + "\" instances what does not exist");
             }
-            if (child.isGroup() && !seen[child.index()]) {
-                seen[child.index()] = true;
+            if (child.isGroup() && seen_by[child.index()] != g) {
+                seen_by[child.index()] = g;
                 children[g].push_back(child.index());
             }
         }

@@ -225,7 +225,8 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
         stats.frames.push_back(frame.stats);
         throwIfCancelled(cancel);
     }
-    if (!frame.stats.debug_text.empty()) std::fprintf(stderr, "%s\n", frame.stats.debug_text.c_str());
+    if (!frame.stats.debug_text.empty())
+        std::fprintf(stderr, "%s\n", frame.stats.debug_text.c_str());
 
     progress.update("write", 0.0);
     const Stopwatch write_watch;
