@@ -24,21 +24,46 @@ void DepthPass::begin(const SubpixelRect& inner, DepthTile&) {
     }
 }
 
-bool DepthPass::take(const PointBlock& block, DepthTile& tile) {
-    const View& view = context_.view;
+namespace {
+
+template <bool kOrthographic>
+inline __attribute__((always_inline)) void projectLoop(const View& view, const PointBlock& block,
+                                                       const SubpixelRect& rect,
+                                                       float* __restrict sx, float* __restrict sy,
+                                                       uint8_t* __restrict inside) {
     const float focal = float(view.focal), cx = float(view.center_x), cy = float(view.center_y);
-    const SubpixelRect& rect = tile.rect();
     const float left = float(rect.x0), right = float(rect.x1), top = float(rect.y0),
                 bottom = float(rect.y1);
+    const float* __restrict x = block.x;
+    const float* __restrict y = block.y;
+    const float* __restrict z = block.z;
+    const uint8_t* __restrict keep = block.keep;
+    const int count = block.count;
+    for (int i = 0; i < count; ++i) {
+        const float scale = kOrthographic ? focal : focal / z[i];
+        const float px = cx + x[i] * scale, py = cy + y[i] * scale;
+        sx[i] = px;
+        sy[i] = py;
+        inside[i] = uint8_t(keep[i] & (px >= left) & (px < right) & (py >= top) & (py < bottom));
+    }
+}
+
+// Subpixel coordinates, and which kept points lie within the tile.
+__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void projectPoints(
+    const View& view, const PointBlock& block, const SubpixelRect& rect, float* sx, float* sy,
+    uint8_t* inside) {
+    view.orthographic ? projectLoop<true>(view, block, rect, sx, sy, inside)
+                      : projectLoop<false>(view, block, rect, sx, sy, inside);
+}
+
+}  // namespace
+
+bool DepthPass::take(const PointBlock& block, DepthTile& tile) {
+    const View& view = context_.view;
+    const SubpixelRect& rect = tile.rect();
     float sx[kBlockPoints], sy[kBlockPoints];
     uint8_t inside[kBlockPoints];
-    for (int i = 0; i < block.count; ++i) {
-        const float scale = view.orthographic ? focal : focal / block.z[i];
-        sx[i] = cx + block.x[i] * scale;
-        sy[i] = cy + block.y[i] * scale;
-        inside[i] = uint8_t(block.keep[i] & (sx[i] >= left) & (sx[i] < right) & (sy[i] >= top) &
-                            (sy[i] < bottom));
-    }
+    projectPoints(view, block, rect, sx, sy, inside);
     int kept[kBlockPoints + 1], n_kept = 0;
     for (int i = 0; i < block.count; ++i) {
         kept[n_kept] = i;

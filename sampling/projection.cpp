@@ -3,6 +3,12 @@
 
 namespace stipple {
 
+namespace {
+
+constexpr double kFlatRatio = 1.01;
+
+}  // namespace
+
 double projectionFactor(const View& view, const DVec3& p, const DVec3& n) {
     const double f2 = view.focal * view.focal;
     if (view.orthographic) return f2 * std::abs(n.z);
@@ -55,13 +61,27 @@ BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& tra
         r.bound = std::numeric_limits<double>::infinity();
         return r;
     }
+    r.depth_ratio = view.orthographic ? 1.0 : z_max / z_min;
     double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300, stretch = 0.0;
-    for (int i = 0; i < 8; ++i) {
-        const DVec3 p = center + (i & 1 ? ax : -ax) + (i & 2 ? ay : -ay) + (i & 4 ? az : -az);
-        const double s = view.orthographic ? 1.0 : 1.0 / p.z;
-        const double x = p.x * s, y = p.y * s;
-        x0 = std::min(x0, x), x1 = std::max(x1, x), y0 = std::min(y0, y), y1 = std::max(y1, y);
-        stretch = std::max(stretch, x * x + y * y);
+    if (r.depth_ratio < kFlatRatio) {
+        // Far boxes: every corner at both depths; hardly looser, and two divisions instead of
+        // eight.
+        const double ex = std::abs(ax.x) + std::abs(ay.x) + std::abs(az.x);
+        const double ey = std::abs(ax.y) + std::abs(ay.y) + std::abs(az.y);
+        const double s_near = view.orthographic ? 1.0 : 1.0 / z_min,
+                     s_far = view.orthographic ? 1.0 : 1.0 / z_max;
+        x0 = std::min((center.x - ex) * s_near, (center.x - ex) * s_far);
+        x1 = std::max((center.x + ex) * s_near, (center.x + ex) * s_far);
+        y0 = std::min((center.y - ey) * s_near, (center.y - ey) * s_far);
+        y1 = std::max((center.y + ey) * s_near, (center.y + ey) * s_far);
+        stretch = std::max(x0 * x0, x1 * x1) + std::max(y0 * y0, y1 * y1);
+    } else {
+        for (int i = 0; i < 8; ++i) {
+            const DVec3 p = center + (i & 1 ? ax : -ax) + (i & 2 ? ay : -ay) + (i & 4 ? az : -az);
+            const double x = p.x / p.z, y = p.y / p.z;
+            x0 = std::min(x0, x), x1 = std::max(x1, x), y0 = std::min(y0, y), y1 = std::max(y1, y);
+            stretch = std::max(stretch, x * x + y * y);
+        }
     }
     const auto clampTo = [](double v, double limit) { return int(std::clamp(v, 0.0, limit)); };
     r.rect = {clampTo(std::floor(view.center_x + x0 * f), width),
@@ -69,7 +89,6 @@ BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& tra
               clampTo(std::floor(view.center_x + x1 * f) + 1.0, width),
               clampTo(std::floor(view.center_y + y1 * f) + 1.0, height)};
     r.size = float(std::max(x1 - x0, y1 - y0) * f);
-    r.depth_ratio = view.orthographic ? 1.0 : z_max / z_min;
     r.bound = view.orthographic ? f * f : f * f * std::sqrt(1.0 + stretch) / (z_min * z_min);
     return r;
 }
