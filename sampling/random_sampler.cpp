@@ -438,12 +438,35 @@ private:
     // another one for each instance, so that equal trees do not show equal points.
     void emitInstance(const Affine& camera_from_object, uint32_t mesh, uint64_t path, double scale,
                       uint32_t count) {
+        const InstanceFrame frame = makeInstanceFrame(camera_from_object, path);
+        // The group's node was drawn for its nearest corner; this instance may need fewer.
+        double density = childDensity(scale);
+        const double needed = settings_.samples * instanceBound(frame, scene_.meshes[mesh].bounds);
+        if (needed < density) {
+            count =
+                uint32_t(roundAtRandom(count * (needed / density), mixBits(path ^ settings_.seed)));
+            density = needed;
+            if (count == 0) return;
+        }
         const uint32_t piece = std::bit_ceil(count);
         const uint32_t length = uint32_t(settings_.list_length);
         const uint32_t first =
             piece * 2 <= length ? uint32_t(path >> 8) % (length / piece) * piece : 0;
-        emitRun(makeInstanceFrame(camera_from_object, path), mesh, 0, childDensity(scale), first,
-                count);
+        emitRun(frame, mesh, 0, density, first, count);
+    }
+
+    // Bound of the projection factor over an instance, by its bounding sphere; infinite near the
+    // eye.
+    double instanceBound(const InstanceFrame& frame, const Box3& bounds) const {
+        const double f2 = view_.focal * view_.focal * frame.area_scale;
+        if (view_.orthographic) return f2;
+        const DVec3 c = frame.camera_from_object.point(DVec3(bounds.center()));
+        const double r = 0.5 * glm::length(DVec3(bounds.extent())) *
+                         maxLengthScale(frame.camera_from_object.linear);
+        const double z = c.z - r;
+        if (z < view_.near_z) return std::numeric_limits<double>::infinity();
+        const double x = (std::abs(c.x) + r) / z, y = (std::abs(c.y) + r) / z;
+        return f2 * std::sqrt(1.0 + x * x + y * y) / (z * z);
     }
 
     // Points [first, first + count) of a mesh node of one instance. density: drawn points per m^2

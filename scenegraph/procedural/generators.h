@@ -45,7 +45,7 @@ struct RockParams {
 };
 GeneratedMesh makeRock(const RockParams& params);
 
-// Heights on a square grid centred on the origin, bilinear between.
+// Heights on a square grid centred on the origin, flat triangles between.
 struct HeightField {
     int resolution = 0;          // samples along a side
     double size = 0.0;           // metres along a side

@@ -123,11 +123,12 @@ double HeightField::height(double x, double z) const {
                  v = std::clamp((z / size + 0.5) * last, 0.0, last);
     const int i = std::min(int(u), resolution - 2), j = std::min(int(v), resolution - 2);
     const double fu = u - i, fv = v - j;
+    // The corners of the cell and its diagonal b-c, as makeTerrain() splits it: what is placed on
+    // the field stands on the mesh.
     const float* row = heights.data() + size_t(j) * size_t(resolution) + size_t(i);
-    const double near = row[0] + fu * (double(row[1]) - row[0]);
-    row += resolution;
-    const double far = row[0] + fu * (double(row[1]) - row[0]);
-    return near + fv * (far - near);
+    const double a = row[0], b = row[1], c = row[resolution], d = row[resolution + 1];
+    if (fu + fv < 1.0) return a + fu * (b - a) + fv * (c - a);
+    return d + (1.0 - fu) * (c - d) + (1.0 - fv) * (b - d);
 }
 
 Vec3 HeightField::normal(double x, double z) const {

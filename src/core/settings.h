@@ -37,7 +37,7 @@ struct RenderSettings {
     double large_triangle =
         1024.0;  // triangles larger than this many subpixels go to OSMesa, before the tiles
     int list_length = 1024;  // most points taken from a node's list before the node is opened
-    int tile_size = 256;     // subpixels along a side of a screen tile (rounded to whole pixels)
+    int tile_size = 384;     // subpixels along a side of a screen tile (rounded to whole pixels)
     bool culling = true;     // skip batches behind what a tile has already drawn
     bool fill = true;        // per-pixel: occlusion removal and filling
 };
