@@ -35,7 +35,7 @@ public:
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
         inner_ = inner;
         tile_.reset(outer, context_.base, kZBufferBit);
-        depth_pass_.begin(inner, tile_);
+        depth_pass_.begin(inner);
         const int s = context_.view.subpixels;
         width_ = inner.width() / s;
         height_ = inner.height() / s;
@@ -53,7 +53,9 @@ public:
 
     bool hides(const SubpixelRect& rect, float z_min) override {
         if (!context_.settings.culling) return false;
-        return tile_.hides(rect, (z_min - slack_metres_) / (1.0f + slack_));
+        // Points of the depth pass cover a subpixel more than they lie in.
+        return tile_.hides({rect.x0 - 1, rect.y0 - 1, rect.x1 + 1, rect.y1 + 1},
+                           (z_min - slack_metres_) / (1.0f + slack_));
     }
     const SubpixelRect& region() const override { return tile_.rect(); }
 

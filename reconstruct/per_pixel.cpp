@@ -15,7 +15,7 @@ DepthPass::DepthPass(const ReconstructionContext& context, int splat_subpixels)
       footprints_(float(context.settings.samples)),
       wants_counts_(context.picture->image().channelIndex("count") >= 0) {}
 
-void DepthPass::begin(const SubpixelRect& inner, DepthTile&) {
+void DepthPass::begin(const SubpixelRect& inner) {
     inner_ = inner;
     since_refresh_ = 0;
     if (wants_counts_) {
@@ -148,10 +148,10 @@ bool DepthPass::splat(DepthTile& tile, float sub_x, float sub_y, float depth, ui
 
 namespace {
 
-uint64_t fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
+bool fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
     const int width = tile.rect().width(), height = tile.rect().height(), w = tile.stride();
     scratch = tile.keys();
-    uint64_t changed = 0;
+    bool is_changed = false;
     for (int y = 1; y + 1 < height; ++y) {
         for (int x = 1; x + 1 < width; ++x) {
             const uint64_t* c = scratch.data() + size_t(y) * size_t(w) + size_t(x);
@@ -176,19 +176,18 @@ uint64_t fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
             if (in_front >= 7 && farthest_front < nearest_depth * 1.02f) {
                 tile.keys()[size_t(y) * size_t(w) + size_t(x)] =
                     DepthTile::pack(farthest_front, DepthTile::numberOf(nearest));
-                ++changed;
+                is_changed = true;
             }
         }
     }
-    return changed;
+    return is_changed;
 }
 
 }  // namespace
 
-uint64_t fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
+void fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
     // Again for holes of three subpixels and more, whose ends the first time closes.
-    const uint64_t changed = fillOnce(tile, scratch);
-    return changed > 0 ? changed + fillOnce(tile, scratch) : 0;
+    if (fillOnce(tile, scratch)) fillOnce(tile, scratch);
 }
 
 namespace {
@@ -207,11 +206,15 @@ public:
         inner_ = inner;
         last_number_ = kNoNumber;
         tile_.reset(outer, context_.base, kZBufferBit);
-        depth_pass_.begin(inner, tile_);
+        depth_pass_.begin(inner);
     }
     void beginPass(int, const SampleLookup&) override {}
     bool hides(const SubpixelRect& rect, float z_min) override {
-        return context_.settings.culling && tile_.hides(rect, z_min);
+        if (!context_.settings.culling) return false;
+        // Points reach beyond the rectangle they lie in.
+        const int reach = halo();
+        return tile_.hides({rect.x0 - reach, rect.y0 - reach, rect.x1 + reach, rect.y1 + reach},
+                           z_min);
     }
     const SubpixelRect& region() const override { return tile_.rect(); }
     bool take(const PointBlock& block) override { return depth_pass_.take(block, tile_); }

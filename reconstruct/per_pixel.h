@@ -18,7 +18,7 @@ std::unique_ptr<TileReconstruction> makePerPixel(const ReconstructionContext& co
 class DepthPass {
 public:
     DepthPass(const ReconstructionContext& context, int splat_subpixels);
-    void begin(const SubpixelRect& inner, DepthTile& tile);
+    void begin(const SubpixelRect& inner);
     // False if none of the block is in front.
     bool take(const PointBlock& block, DepthTile& tile);
     bool take(const TriangleBlock& block, DepthTile& tile);
@@ -44,8 +44,7 @@ private:
 };
 
 // Occlusion removal and filling in one: a subpixel that is empty, or shows something clearly behind
-// what most of its neighbours agree to be one surface, takes a neighbour's point. Returns the
-// number of subpixels changed.
-uint64_t fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch);
+// what most of its neighbours agree to be one surface, takes a neighbour's point.
+void fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch);
 
 }  // namespace stipple

@@ -39,7 +39,7 @@ inline NodeClass classifyNode(const MeshNode& node, const BoxProjection& box, do
         return is_leaf || (is_uniform && (fits || n <= kFewPoints)) ? NodeClass::kPoints
                                                                     : NodeClass::kOpen;
     }
-    if (is_mixed) return is_leaf ? NodeClass::kTriangles : NodeClass::kOpen;
+    if (is_mixed) return NodeClass::kOpen;  // never a leaf
     // What is large at the far end of the box is large everywhere in it.
     const double far_largest = largest / (box.depth_ratio * box.depth_ratio);
     if ((is_leaf ? largest : far_largest) > settings.large_triangle) {

@@ -9,13 +9,6 @@ constexpr double kFlatRatio = 1.01;
 
 }  // namespace
 
-double projectionFactor(const View& view, const DVec3& p, const DVec3& n) {
-    const double f2 = view.focal * view.focal;
-    if (view.orthographic) return f2 * std::abs(n.z);
-    // cos beta / cos alpha = (|n.p| / r) / (z / r).
-    return f2 * std::abs(glm::dot(n, p)) / (p.z * p.z * p.z);
-}
-
 BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& translation,
                          const Box3& box) {
     BoxProjection r;
@@ -53,7 +46,6 @@ BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& tra
     r.is_visible = true;
     r.is_inside = inside;
     r.z_min = float(std::max(z_min, double(view.near_z)));
-    r.z_max = float(z_max);
     if (z_min < view.near_z) {
         r.rect = {0, 0, view.subWidth(), view.subHeight()};
         r.size = kInfinity;

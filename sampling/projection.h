@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The projection factor and its bound over a node's box.
-// Based on: Wand et al. 2001 ("Projection Factor", "Approximation", "Choosing Groups").
+// The bound of the projection factor over a node's box: prj(x) = f^2 * (1/z^2) * (cos beta / cos
+// alpha) in subpixels per area (orthographic: f^2 * cos beta). Based on: Wand et al. 2001
+// ("Projection Factor", "Approximation", "Choosing Groups").
 #pragma once
 
 #include <core/camera.h>
@@ -8,17 +9,12 @@
 
 namespace stipple {
 
-// prj(x) = f^2 * (1/z^2) * (cos beta / cos alpha) in subpixels per area; orthographic: f^2 * cos
-// beta. normal_camera need not face the eye; its length counts as area.
-double projectionFactor(const View& view, const DVec3& p_camera, const DVec3& normal_camera);
-
 // What a box looks like from the eye.
 struct BoxProjection {
     bool is_visible = false;  // may touch the frustum
     bool is_inside = false;   // lies wholly within it
     float z_min = 0.0f;       // at least near_z
-    float z_max = 0.0f;
-    SubpixelRect rect;  // clipped to the picture
+    SubpixelRect rect;        // clipped to the picture
     float size = 0.0f;  // larger side of the unclipped rectangle, subpixels; infinite if it reaches
                         // behind near_z
     double depth_ratio = 1.0;  // z_max / z_min; infinite if it reaches behind near_z

@@ -261,16 +261,14 @@ private:
                     block.x[k][i] = p.x, block.y[k][i] = p.y, block.z[k][i] = p.z;
                 }
             }
-            const Stratum& stratum = mesh.strata[mesh.triangle_stratum[node.first_triangle]];
+            const Stratum& stratum = mesh.strata[node.stratum];
             Run run;
             run.mesh = mesh_index;
             run.first_index = node.first_triangle + first;
             run.triangle_frame = triangle_frame;
             run.object = objectId(frame.path);
             runs_.push_back(run);
-            // note: a block of a small mesh may mix strata; sidedness is then decided triangle by
-            // triangle.
-            dropBackFaces(mesh, frame, run.first_index, block);
+            if (!stratum.double_sided) dropBackFaces(frame, block);
             const TriangleMask mask(*this, block.first_number, block);
             block.mask = stratum.masked ? &mask : nullptr;
             if (!sink_->take(block)) runs_.pop_back();
@@ -278,12 +276,9 @@ private:
     }
 
     // Single-sided triangles seen from behind become degenerate, so that numbers stay in place.
-    void dropBackFaces(const Mesh& mesh, const InstanceFrame& frame, uint32_t first_triangle,
-                       TriangleBlock& block) const {
+    void dropBackFaces(const InstanceFrame& frame, TriangleBlock& block) const {
         const float sign = glm::determinant(frame.camera_from_object.linear) < 0.0 ? -1.0f : 1.0f;
         for (int i = 0; i < block.count; ++i) {
-            const uint32_t t = first_triangle + uint32_t(i);
-            if (mesh.strata[mesh.triangle_stratum[t]].double_sided) continue;
             const Vec3 a = block.vertex(0, i);
             const Vec3 n = glm::cross(block.vertex(1, i) - a, block.vertex(2, i) - a) * sign;
             if ((view_.orthographic ? n.z : glm::dot(n, a)) < 0.0f) continue;

@@ -31,9 +31,8 @@ struct SubpixelRect {
 // Something to draw: a node of the scene graph, which emit() may open further. What the frame loop
 // must know to bin, sort and skip it.
 struct Batch {
-    SubpixelRect rect;   // encloses the projection of all its points, clipped to the picture
-    float z_min = 0.0f;  // camera z of its points
-    float z_max = 0.0f;
+    SubpixelRect rect;          // encloses the projection of all its points, clipped to the picture
+    float z_min = 0.0f;         // camera z of its nearest point
     float expected_points = 0;  // about what emit() would draw if nothing hid it
     uint32_t index = 0;         // the source's own number of it
 };

@@ -69,12 +69,16 @@ Image render(const Scene& scene, FrameRequest r, int threads = 2) {
     return Renderer(scene, pool).render(r).image;
 }
 
+Image castRays(const Scene& scene, FrameRequest r) {
+    r.settings.method = Method::kRaycast;
+    r.settings.samples = 64;
+    return render(scene, r);
+}
+
 TEST(MethodsAgree, pointsAndZBufferShowWhatRaysSee) {
     const Scene scene = testScene(DVec3(0));
     FrameRequest r = request(DVec3(0));
-    r.settings.method = Method::kRaycast;
-    r.settings.samples = 64;
-    const Image reference = render(scene, r);
+    const Image reference = castRays(scene, r);
     ThreadPool pool(2);
     r.settings.method = Method::kZBuffer;
     r.settings.samples = 1;
@@ -92,9 +96,7 @@ TEST(MethodsAgree, pointsAndZBufferShowWhatRaysSee) {
 TEST(MethodsAgree, allAsPointsIsAsGood) {
     const Scene scene = testScene(DVec3(0));
     FrameRequest r = request(DVec3(0));
-    r.settings.method = Method::kRaycast;
-    r.settings.samples = 64;
-    const Image reference = render(scene, r);
+    const Image reference = castRays(scene, r);
     r.settings.method = Method::kPoints;
     r.settings.samples = 3;
     r.settings.area_threshold = 40.0;  // leaves near the eye, too
@@ -123,9 +125,15 @@ TEST(MethodsAgree, sameBitsForAnyThreadsAndCaches) {
 TEST(MethodsAgree, cullingChangesNothing) {
     const Scene scene = testScene(DVec3(0));
     FrameRequest r = request(DVec3(0));
-    const Image culled = render(scene, r);
-    r.settings.culling = false;
-    EXPECT_EQ(culled.data, render(scene, r).data);
+    for (const Reconstruct reconstruct :
+         {Reconstruct::kPerPixel, Reconstruct::kSplat, Reconstruct::kGaussian}) {
+        r.settings.reconstruct = reconstruct;
+        r.settings.splat_size = 2.0;
+        r.settings.culling = true;
+        const Image culled = render(scene, r);
+        r.settings.culling = false;
+        EXPECT_EQ(culled.data, render(scene, r).data);
+    }
 }
 
 TEST(MethodsAgree, farFromTheOriginIsTheSame) {
