@@ -2,13 +2,9 @@
 #include <reconstruct/footprint.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstdint>
 
 namespace stipple {
-
-namespace {
 
 Footprint makeFootprint(float width, float k) {
     Footprint footprint;
@@ -31,24 +27,22 @@ Footprint makeFootprint(float width, float k) {
     return footprint;
 }
 
-}  // namespace
-
 float balancedDensity(float width) {
     return 1.0f + 0.6f * std::log1p(0.45f * width) + 0.25f * std::max(0.0f, width - 16.0f);
 }
 
 FootprintTable::FootprintTable(float k) {
-    for (int i = 0; i < kOctaves * kPerOctave; ++i) {
-        const float width = std::ldexp(1.0f + (float(i % kPerOctave) + 0.5f) / kPerOctave,
-                                       kFirstExponent + i / kPerOctave);
-        table_[size_t(i)] = makeFootprint(width, k);
+    for (int code = 0; code < kWidthCodes; ++code) {
+        const float mantissa =
+            1.0f + (float(code % kWidthsPerOctave) + 0.5f) / float(kWidthsPerOctave);
+        const Footprint footprint =
+            code == kNoPatch
+                ? Footprint()
+                : makeFootprint(
+                      std::ldexp(mantissa, kFirstSubpixelExponent + code / kWidthsPerOctave), k);
+        half_side[size_t(code)] = footprint.half_side;
+        wide_share[size_t(code)] = footprint.wide_share;
     }
-}
-
-const Footprint& FootprintTable::of(float width) const {
-    // Exponent and the first three bits of the mantissa.
-    const int bits = int(std::bit_cast<uint32_t>(width) >> 20) - ((127 + kFirstExponent) << 3);
-    return table_[size_t(std::clamp(bits, 0, kOctaves * kPerOctave - 1))];
 }
 
 }  // namespace stipple

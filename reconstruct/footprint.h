@@ -11,6 +11,8 @@
 // x 2 subpixels where K alone would not; their silhouettes grow by half a subpixel in exchange.
 #pragma once
 
+#include <core/points.h>
+
 #include <array>
 
 namespace stipple {
@@ -21,16 +23,13 @@ struct Footprint {
     float wide_share = 0.0f;  // share of the points that cover the 2 x 2 subpixels around them
 };
 
-// Footprints for all widths at one K.
-class FootprintTable {
-public:
-    explicit FootprintTable(float k);
-    // width: of the patch, in subpixels.
-    const Footprint& of(float width) const;
+// k: kept points a subpixel. width: of the patch, in subpixels.
+Footprint makeFootprint(float width, float k);
 
-private:
-    static constexpr int kOctaves = 24, kPerOctave = 8, kFirstExponent = -8;
-    std::array<Footprint, kOctaves * kPerOctave> table_;
+// Footprints at one K for all patchWidthCode()s.
+struct FootprintTable {
+    explicit FootprintTable(float k);
+    std::array<float, kWidthCodes> half_side, wide_share;
 };
 
 // Points per footprint at which points of one footprint each cover, in expectation, as much as a

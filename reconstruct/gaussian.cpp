@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/gaussian.h>
 
-#include <reconstruct/depth_tile.h>
+#include <reconstruct/depth_pass.h>
 #include <reconstruct/per_pixel.h>
 #include <reconstruct/shade.h>
 
@@ -51,10 +51,10 @@ public:
         takeTriangles();
     }
 
-    bool hides(const SubpixelRect& rect, float z_min) override {
+    bool hides(const SubpixelRect& rect, float z_min, bool narrow) override {
         if (!context_.settings.culling) return false;
-        // Points of the depth pass cover a subpixel more than they lie in.
-        return tile_.hides({rect.x0 - 1, rect.y0 - 1, rect.x1 + 1, rect.y1 + 1},
+        const int reach = depth_pass_.reach(narrow);
+        return tile_.hides({rect.x0 - reach, rect.y0 - reach, rect.x1 + reach, rect.y1 + reach},
                            (z_min - slack_metres_) / (1.0f + slack_));
     }
     const SubpixelRect& region() const override { return tile_.rect(); }
@@ -93,7 +93,7 @@ private:
             SurfaceSample sample;
             sample.depth = block.z[i];
             sample.position_camera = Vec3(block.x[i], block.y[i], block.z[i]);
-            lookup_->lookUp(block.first_number + uint32_t(i), p.x, p.y, sample);
+            lookup_->lookUp(block.number[i], p.x, p.y, sample);
             spread(sample, p, 1.0f);
         }
     }

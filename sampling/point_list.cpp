@@ -55,147 +55,153 @@ Vec3 unpackSrgb8(uint32_t p) {
     return Vec3(table[p & 255], table[p >> 8 & 255], table[p >> 16 & 255]);
 }
 
-MeshPoint drawMeshPoint(const Mesh& mesh, const MeshNode& node, Sampler sampler, uint64_t key,
-                        uint32_t index) {
-    const double* cumulative = mesh.cumulative_area.data();
-    const uint32_t first = node.first_triangle, count = node.triangle_count;
-    const double begin = cumulative[first], area = cumulative[first + count] - begin;
-    // Position along the list, in [0, 1): van der Corput with a random shift, or random.
-    double t;
-    if (sampler == Sampler::kRandom) {
-        t = uniformDouble(hashCombine(key, index));
-    } else {
-        t = double(reverseBits(index)) * 0x1p-32 + uniformDouble(key);
-        t -= std::floor(t);
-    }
-    const double target = begin + t * area;
-    const double* found =
-        std::upper_bound(cumulative + first + 1, cumulative + first + count, target);
-    MeshPoint p;
-    p.triangle = uint32_t(found - cumulative) - 1;
-    const double triangle_area = cumulative[p.triangle + 1] - cumulative[p.triangle];
-    double r = triangle_area > 0.0
-                   ? std::clamp((target - cumulative[p.triangle]) / triangle_area, 0.0, 1.0)
-                   : 0.0;
-    if (sampler == Sampler::kRandom) {
-        const float a = std::sqrt(float(r)), b = uniformFloat(hashCombine(key, index, 1));
-        p.u = a * (1.0f - b), p.v = a * b;
-        return p;
-    }
-    // Base-4 digits of the remainder choose one of four sub-triangles, coarse to fine.
-    Vec2 a(0, 0), b(1, 0), c(0, 1);
-    for (int digit = 0; digit < 8; ++digit) {
-        r *= 4.0;
-        const int d = std::min(int(r), 3);
-        r -= d;
-        const Vec2 ab = 0.5f * (a + b), bc = 0.5f * (b + c), ca = 0.5f * (c + a);
-        switch (d) {
-            case 0:
-                a = bc, b = ca, c = ab;
-                break;
-            case 1:
-                b = ab, c = ca;
-                break;
-            case 2:
-                a = ab, c = bc;
-                break;
-            default:
-                a = ca, b = bc;
-                break;
-        }
-    }
-    // What is left is placed at random within the last sub-triangle.
-    const uint64_t h = hashCombine(key, index, 2);
-    float s = uniformFloat(h), q = uniformFloat(mixBits(h));
-    if (s + q > 1.0f) s = 1.0f - s, q = 1.0f - q;
-    const Vec2 uv = a + (b - a) * s + (c - a) * q;
-    p.u = uv.x, p.v = uv.y;
-    return p;
-}
-
 struct PointLists::List {
     uint32_t block_count = 0;
     std::unique_ptr<ListBlock[]> blocks;
 };
 
 PointLists::PointLists(const Scene& scene) : scene_(scene) {
-    for (const Mesh& mesh : scene.meshes)
-        slots_.push_back(std::make_unique<Slot[]>(mesh.nodes.size()));
+    constexpr uint32_t kOften = 8;
+    std::vector<uint32_t> uses(scene.groups.size(), 0);
+    for (const Group& group : scene.groups) {
+        for (size_t i = 0; i < group.instances.size(); ++i) {
+            const ChildRef child = group.instances.child(i);
+            if (child.isGroup()) ++uses[child.index()];
+        }
+    }
+    for (const Mesh& mesh : scene.meshes) mesh_slots_.emplace_back(mesh.nodes.size());
+    for (size_t g = 0; g < scene.groups.size(); ++g) {
+        const Group& group = scene.groups[g];
+        group_slots_.emplace_back(group.depth == 1 && uses[g] >= kOften ? group.nodes.size() : 0);
+    }
 }
 
-PointLists::~PointLists() { clear(); }
+PointLists::~PointLists() {
+    forEachSlot([](Slot& slot) { delete slot.list.load(); });
+}
 
-void PointLists::clear() {
-    for (size_t m = 0; m < slots_.size(); ++m) {
-        for (size_t n = 0; n < scene_.meshes[m].nodes.size(); ++n)
-            delete slots_[m][n].list.exchange(nullptr);
+template <class Visit>
+void PointLists::forEachSlot(const Visit& visit) {
+    for (auto* all : {&mesh_slots_, &group_slots_}) {
+        for (Slots& slots : *all) {
+            for (Slot& slot : slots) visit(slot);
+        }
     }
-    retired_.clear();
-    bytes_ = 0;
 }
 
 void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
     retired_.clear();
     budget_ = budget_bytes;
-    if (!(identity == identity_)) {
-        clear();
-        identity_ = identity;
-    }
-    if (bytes_ > budget_) {
-        for (size_t m = 0; m < slots_.size(); ++m) {
-            for (size_t n = 0; n < scene_.meshes[m].nodes.size(); ++n) {
-                Slot& slot = slots_[m][n];
-                List* list = slot.list.load();
-                if (!list || (budget_ > 0 && slot.last_used.load() == frame_)) continue;
-                bytes_ -= list->block_count * sizeof(ListBlock);
-                delete slot.list.exchange(nullptr);
-            }
-        }
+    const bool is_new = !(identity == identity_);
+    identity_ = identity;
+    if (is_new || bytes_ > budget_) {
+        forEachSlot([&](Slot& slot) {
+            List* list = slot.list.load();
+            if (!list || (!is_new && budget_ > 0 && slot.last_used.load() == frame_)) return;
+            bytes_ -= list->block_count * sizeof(ListBlock);
+            delete slot.list.exchange(nullptr);
+        });
     }
     ++frame_;
 }
 
-void PointLists::makePoints(uint32_t mesh_index, uint32_t node_index, uint32_t first, int count,
-                            ListBlock& out) const {
-    const Mesh& mesh = scene_.meshes[mesh_index];
-    const MeshNode& node = mesh.nodes[node_index];
-    const uint64_t key = hashCombine(identity_.seed, mesh_index, node_index);
-    const Vec3 extent = node.bounds.extent();
-    // A point of a full list stands for this much of the surface; textures are filtered to it.
-    const float footprint = float(std::sqrt(node.area / double(kBlockPoints * 16)));
-    for (int lane = 0; lane < count; ++lane) {
-        const uint32_t index = first + uint32_t(lane);
-        const MeshPoint p = drawMeshPoint(mesh, node, identity_.sampler, key, index);
-        const UVec3& t = mesh.triangles[p.triangle];
-        const Vec3 a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a,
-                   e2 = mesh.positions[t.z] - a;
-        const Vec3 position = a + e1 * p.u + e2 * p.v;
-        const DVec3 n = glm::normalize(glm::cross(DVec3(e1), DVec3(e2)));
-        for (int axis = 0; axis < 3; ++axis) {
-            const float q = extent[axis] > 0.0f
-                                ? (position[axis] - node.bounds.min[axis]) / extent[axis]
-                                : 0.0f;
-            out.position[axis][lane] = uint16_t(std::clamp(q, 0.0f, 1.0f) * 65535.0f + 0.5f);
-            out.normal[axis][lane] = int16_t(std::lround(n[axis] * 32767.0));
-        }
-        const MeshSurface surface =
-            surfaceAt(mesh, scene_.materials, scene_.textures, p.triangle, p.u, p.v, footprint);
-        const uint16_t material_index = mesh.triangle_material[p.triangle];
-        const Material& material = scene_.materials[material_index];
-        const bool is_there = material.alpha_mode == AlphaMode::kOpaque ||
-                              (material.alpha_mode == AlphaMode::kMask
-                                   ? alphaAt(mesh, scene_.materials, scene_.textures, p.triangle,
-                                             p.u, p.v) >= material.alpha_cutoff
-                                   : uniformFloat(hashCombine(key, index, 3)) < surface.alpha);
-        out.stratum[lane] = is_there ? mesh.triangle_stratum[p.triangle] : kNoSurface;
-        out.shading_normal[lane] = packOctahedral(surface.normal_object);
-        out.albedo[lane] = packSrgb8(surface.albedo);
-        out.material[lane] = material_index;
-    }
+namespace {
+
+// A point before it is quantized, in the space of its node.
+struct Point {
+    Vec3 position = Vec3(0);
+    DVec3 normal = DVec3(0);  // geometric; length: the density it deserves over that of its list
+    Vec3 shading_normal = Vec3(0), albedo = Vec3(0);
+    float patch_width = 0.0f;
+    bool single_sided = false;
+    uint16_t material = 0;
+    uint32_t slot = 0;
+};
+
+// A point of a full list stands for this much of the surface; textures are filtered to it.
+float listFootprint(double area) { return float(std::sqrt(area / double(kBlockPoints * 16))); }
+
+Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const MeshNode& node, double position,
+                    float footprint, const PointKey& key) {
+    const MeshPoint at = meshPointAt(mesh, node, position, key);
+    const UVec3& t = mesh.triangles[at.triangle];
+    const Vec3 a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a, e2 = mesh.positions[t.z] - a;
+    const MeshSurface surface =
+        surfaceAt(mesh, scene.materials, scene.textures, at.triangle, at.u, at.v, footprint);
+    const Stratum& stratum = mesh.strata[mesh.triangle_stratum[at.triangle]];
+    Point p;
+    p.position = a + e1 * at.u + e2 * at.v;
+    p.shading_normal = surface.normal_object;
+    p.albedo = surface.albedo;
+    p.patch_width = stratum.patch_width;
+    p.single_sided = !stratum.double_sided;
+    p.material = mesh.triangle_material[at.triangle];
+    const Material& material = scene.materials[p.material];
+    const bool is_there = material.alpha_mode == AlphaMode::kOpaque ||
+                          (material.alpha_mode == AlphaMode::kMask
+                               ? alphaAt(mesh, scene.materials, scene.textures, at.triangle, at.u,
+                                         at.v) >= material.alpha_cutoff
+                               : uniformFloat(hashCombine(key.list, key.index, 3)) < surface.alpha);
+    if (is_there) p.normal = glm::normalize(glm::cross(DVec3(e1), DVec3(e2)));
+    return p;
 }
 
-PointLists::List* PointLists::grow(Slot& slot, uint32_t mesh, uint32_t node, uint32_t n_blocks) {
-    const std::lock_guard lock(stripes_[(mesh * 31 + node) % kStripes]);
+Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, const PointKey& key) {
+    const InstancePoint at = instanceAt(scene, group, node, listPosition(key));
+    const Mesh& mesh = scene.meshes[group.instances.child(at.instance).index()];
+    const Affine group_from_mesh = group.instances.groupFromChild(at.instance);
+    const double area_scale = std::max(group.instances.areaScale(at.instance), 1e-30);
+    const float length_scale = float(std::sqrt(area_scale));
+    Point p = makeMeshPoint(scene, mesh, mesh.nodes[0], at.position,
+                            listFootprint(group.nodes[node].area) / length_scale, key);
+    // Drawn for the largest area scale of the transform; this orientation's may be smaller.
+    DMat3 area_map = cofactor(group_from_mesh.linear);
+    area_map *= (glm::dot(group_from_mesh.linear[0], area_map[0]) < 0.0 ? -1.0 : 1.0) / area_scale;
+    p.position = Vec3(group_from_mesh.point(DVec3(p.position)));
+    p.normal = area_map * p.normal;
+    const DVec3 shading = area_map * DVec3(p.shading_normal);
+    p.shading_normal = Vec3(shading / std::max(glm::length(shading), 1e-30));
+    p.patch_width *= length_scale;
+    p.slot = group.listed_index[at.instance];
+    return p;
+}
+
+Point makePoint(const Scene& scene, ChildRef child, uint32_t node, const PointKey& key) {
+    if (child.isGroup()) return makeGroupPoint(scene, scene.groups[child.index()], node, key);
+    const Mesh& mesh = scene.meshes[child.index()];
+    return makeMeshPoint(scene, mesh, mesh.nodes[node], listPosition(key),
+                         listFootprint(mesh.nodes[node].area), key);
+}
+
+void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
+    const Vec3 extent = box.extent();
+    for (int axis = 0; axis < 3; ++axis) {
+        const float q =
+            extent[axis] > 0.0f ? (p.position[axis] - box.min[axis]) / extent[axis] : 0.0f;
+        out.position[axis][lane] = uint16_t(std::clamp(q, 0.0f, 1.0f) * 65535.0f + 0.5f);
+        out.normal[axis][lane] = int16_t(std::lround(p.normal[axis] * 32767.0));
+    }
+    out.width[lane] = patchWidthCode(p.patch_width, kFirstMetreExponent);
+    out.single_sided[lane] = p.single_sided;
+    out.shading_normal[lane] = packOctahedral(p.shading_normal);
+    out.albedo[lane] = packSrgb8(p.albedo);
+    out.material[lane] = p.material;
+    out.slot[lane] = p.slot;
+}
+
+}  // namespace
+
+void PointLists::makePoints(ChildRef child, uint32_t node, uint32_t first, int count,
+                            ListBlock& out) const {
+    const Box3& box = child.isGroup() ? scene_.groups[child.index()].nodes[node].bounds
+                                      : scene_.meshes[child.index()].nodes[node].bounds;
+    PointKey key{identity_.sampler, hashCombine(identity_.seed, child.bits, node), first};
+    for (int lane = 0; lane < count; ++lane, ++key.index)
+        writePoint(makePoint(scene_, child, node, key), box, lane, out);
+}
+
+PointLists::List* PointLists::grow(Slot& slot, ChildRef child, uint32_t node, uint32_t n_blocks) {
+    const std::lock_guard lock(stripes_[(child.bits * 31 + node) % kStripes]);
     List* old = slot.list.load(std::memory_order_acquire);
     if (old && old->block_count >= n_blocks) return old;
     uint32_t capacity = 1;
@@ -209,7 +215,7 @@ PointLists::List* PointLists::grow(Slot& slot, uint32_t mesh, uint32_t node, uin
     const uint32_t have = old ? old->block_count : 0;
     if (old) std::memcpy(list->blocks.get(), old->blocks.get(), have * sizeof(ListBlock));
     for (uint32_t b = have; b < capacity; ++b)
-        makePoints(mesh, node, b * kBlockPoints, kBlockPoints, list->blocks[b]);
+        makePoints(child, node, b * kBlockPoints, kBlockPoints, list->blocks[b]);
     List* result = list.release();
     slot.list.store(result, std::memory_order_release);
     if (old) {
@@ -221,14 +227,14 @@ PointLists::List* PointLists::grow(Slot& slot, uint32_t mesh, uint32_t node, uin
     return result;
 }
 
-const ListBlock& PointLists::points(uint32_t mesh, uint32_t node, uint32_t first, int count,
+const ListBlock& PointLists::points(ChildRef child, uint32_t node, uint32_t first, int count,
                                     uint32_t list_length, ListBlock& scratch, int& first_lane) {
     const uint32_t block = first / kBlockPoints;
     if (budget_ > 0 && first < list_length) {
-        Slot& slot = slots_[mesh][node];
+        Slot& slot = slotsOf(child)[node];
         List* list = slot.list.load(std::memory_order_acquire);
         if (!list || list->block_count <= block) {
-            list = grow(slot, mesh, node, (list_length + kBlockPoints - 1) / kBlockPoints);
+            list = grow(slot, child, node, (list_length + kBlockPoints - 1) / kBlockPoints);
         }
         if (list) {
             if (slot.last_used.load(std::memory_order_relaxed) != frame_) {
@@ -238,7 +244,7 @@ const ListBlock& PointLists::points(uint32_t mesh, uint32_t node, uint32_t first
             return list->blocks[block];
         }
     }
-    makePoints(mesh, node, first, count, scratch);
+    makePoints(child, node, first, count, scratch);
     first_lane = 0;
     return scratch;
 }

@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The points of a mesh node: an endless sequence, each point a pure function of (seed, mesh, node,
-// index), and a cache of the sequences' beginnings. With the stratified sampler every prefix is
-// well spread over the node's area: the index, bit-reversed, runs along the distribution list,
-// whose triangles are in Morton order. Based on: Wand et al. 2001 ("Precomputation: Distribution
-// List", "Sample caching"); van der Corput sequence; Basu, Owen. Low discrepancy constructions in
-// the triangle. 2015 (the remainder steers a 4-way subdivision of the triangle).
+// The points of a node of a mesh, or of a group that is instanced often: an endless sequence, each
+// point a pure function of (seed, mesh or group, node, index), and a cache of the sequences'
+// beginnings. With the stratified sampler every prefix is well spread over the node's area: the
+// index, bit-reversed, runs along the distribution list, whose triangles are in Morton order. Based
+// on: Wand et al. 2001 ("Sample caching").
 #pragma once
 
 #include <core/points.h>
-#include <scenegraph/scene.h>
+#include <sampling/list_point.h>
 
 #include <atomic>
 #include <memory>
@@ -16,17 +15,21 @@
 
 namespace stipple {
 
-// Stratum of a point that lies where an alpha mask says there is no surface.
-inline constexpr uint8_t kNoSurface = 15;
+// Patch widths of list points are codes of metres from 2^this.
+inline constexpr int kFirstMetreExponent = -14;
 
-// 64 points, quantized to the node's box: 23 bytes each, those that drawing reads first.
+// 64 points, quantized to the node's box: 20 bytes each, those that drawing reads first.
 struct ListBlock {
     alignas(64) uint16_t position[3][kBlockPoints];  // box.min + box.extent * q / 65535
-    int16_t normal[3][kBlockPoints];                 // geometric, unit * 32767
-    uint8_t stratum[kBlockPoints];                   // index into Mesh::strata, or kNoSurface
+    int16_t normal[3][kBlockPoints];                 // geometric, times 32767 x the density that it
+                                                     // deserves over that of the list; 0 where an
+                                                     // alpha mask says there is no surface
+    uint8_t width[kBlockPoints];                     // patchWidthCode(), in metres
+    uint8_t single_sided[kBlockPoints];              // 1: not seen from behind
     uint32_t shading_normal[kBlockPoints];           // octahedral, 2 x 16 bits
     uint32_t albedo[kBlockPoints];                   // sRGB-encoded, 8 bits a channel
     uint16_t material[kBlockPoints];
+    uint32_t slot[kBlockPoints];  // in lists of groups: the instance's place in the group
 };
 
 uint32_t packOctahedral(const Vec3& unit);
@@ -34,15 +37,8 @@ Vec3 unpackOctahedral(uint32_t packed);
 uint32_t packSrgb8(const Vec3& linear);
 Vec3 unpackSrgb8(uint32_t packed);
 
-// Where on a mesh a point lies.
-struct MeshPoint {
-    uint32_t triangle = 0;
-    float u = 0.0f, v = 0.0f;
-};
-
-// Point `index` of a node's sequence, uniform over the node's area.
-MeshPoint drawMeshPoint(const Mesh& mesh, const MeshNode& node, Sampler sampler, uint64_t key,
-                        uint32_t index);
+// Lists grow up to here; points beyond are made anew each time.
+inline constexpr uint32_t kLongestList = 4096;
 
 // Names the sequences: everything their points depend on.
 struct ListIdentity {
@@ -56,6 +52,9 @@ public:
     explicit PointLists(const Scene& scene);
     ~PointLists();
 
+    // Meshes have lists, and innermost groups with many instances of their own: one list serves
+    // all.
+    bool hasLists(ChildRef child) const { return !slotsOf(child).empty(); }
     // Call between frames: sets the identity (a new one empties the cache) and the budget; above
     // it, lists that were not used in the last frame are dropped.
     void startFrame(const ListIdentity& identity, size_t budget_bytes);
@@ -63,7 +62,7 @@ public:
     // lanes [first_lane, first_lane + count) of the block returned. From the cache, which first
     // grows to `list_length` points if the budget allows, else made in `scratch`. The same bits
     // either way. Thread-safe.
-    const ListBlock& points(uint32_t mesh, uint32_t node, uint32_t first, int count,
+    const ListBlock& points(ChildRef child, uint32_t node, uint32_t first, int count,
                             uint32_t list_length, ListBlock& scratch, int& first_lane);
     size_t bytes() const { return bytes_.load(std::memory_order_relaxed); }
 
@@ -73,13 +72,21 @@ private:
         std::atomic<List*> list{nullptr};
         std::atomic<uint32_t> last_used{0};
     };
+    using Slots = std::vector<Slot>;  // one a node
 
-    void makePoints(uint32_t mesh, uint32_t node, uint32_t first, int count, ListBlock& out) const;
-    List* grow(Slot& slot, uint32_t mesh, uint32_t node, uint32_t n_blocks);
-    void clear();
+    const Slots& slotsOf(ChildRef child) const {
+        return (child.isGroup() ? group_slots_ : mesh_slots_)[child.index()];
+    }
+    Slots& slotsOf(ChildRef child) {
+        return (child.isGroup() ? group_slots_ : mesh_slots_)[child.index()];
+    }
+    template <class Visit>
+    void forEachSlot(const Visit& visit);
+    void makePoints(ChildRef child, uint32_t node, uint32_t first, int count, ListBlock& out) const;
+    List* grow(Slot& slot, ChildRef child, uint32_t node, uint32_t n_blocks);
 
     const Scene& scene_;
-    std::vector<std::unique_ptr<Slot[]>> slots_;  // [mesh][node]
+    std::vector<Slots> mesh_slots_, group_slots_;
     ListIdentity identity_;
     size_t budget_ = 0;
     std::atomic<size_t> bytes_{0};

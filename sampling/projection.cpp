@@ -48,7 +48,7 @@ BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& tra
     r.z_min = float(std::max(z_min, double(view.near_z)));
     if (z_min < view.near_z) {
         r.rect = {0, 0, view.subWidth(), view.subHeight()};
-        r.size = kInfinity;
+        r.size = r.thickness = kInfinity;
         r.depth_ratio = std::numeric_limits<double>::infinity();
         r.bound = std::numeric_limits<double>::infinity();
         return r;
@@ -81,6 +81,7 @@ BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& tra
               clampTo(std::floor(view.center_x + x1 * f) + 1.0, width),
               clampTo(std::floor(view.center_y + y1 * f) + 1.0, height)};
     r.size = float(std::max(x1 - x0, y1 - y0) * f);
+    r.thickness = float(std::min(x1 - x0, y1 - y0) * f);
     r.bound = view.orthographic ? f * f : f * f * std::sqrt(1.0 + stretch) / (z_min * z_min);
     return r;
 }

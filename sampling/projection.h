@@ -17,6 +17,7 @@ struct BoxProjection {
     SubpixelRect rect;        // clipped to the picture
     float size = 0.0f;  // larger side of the unclipped rectangle, subpixels; infinite if it reaches
                         // behind near_z
+    float thickness = 0.0f;    // the smaller side
     double depth_ratio = 1.0;  // z_max / z_min; infinite if it reaches behind near_z
     double bound = 0.0;  // largest projection factor of a unit area with unit area scale, whatever
                          // its orientation

@@ -1,25 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sampling/transform_kernel.h>
 
+#include <core/rng.h>
+
 #include <algorithm>
 
 namespace stipple {
 
 namespace {
 
-// A cheap integer hash with good avalanche (low bias), vectorizable.
-inline uint32_t mix32(uint32_t v) {
-    v ^= v >> 16;
-    v *= 0x7feb352du;
-    v ^= v >> 15;
-    v *= 0x846ca68bu;
-    return v ^ v >> 16;
-}
-
 template <bool kOrthographic, bool kRandom>
 inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
-                                                         const ListBlock& block, int first_lane,
-                                                         uint32_t first_index, PointBlock& out) {
+                                                         const ListBlock& list, int first_lane,
+                                                         uint32_t first_index, int count,
+                                                         uint32_t first_number, int lane,
+                                                         PointBlock& out) {
     // Plain locals and restricted pointers, or the compiler will not vectorize.
     const float m00 = p.camera_from_object[0].x, m01 = p.camera_from_object[1].x,
                 m02 = p.camera_from_object[2].x;
@@ -30,27 +25,27 @@ inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
     const float bx = p.box_from_eye.x, by = p.box_from_eye.y, bz = p.box_from_eye.z;
     const float sx = p.step.x, sy = p.step.y, sz = p.step.z;
     const float fx = p.facing.x, fy = p.facing.y, fz = p.facing.z;
-    const float z_near = p.z_near;
+    const float z_near = p.z_near, gain = p.gain;
     const uint32_t hash = p.hash;
-    const uint16_t* __restrict px = block.position[0] + first_lane;
-    const uint16_t* __restrict py = block.position[1] + first_lane;
-    const uint16_t* __restrict pz = block.position[2] + first_lane;
-    const int16_t* __restrict qx = block.normal[0] + first_lane;
-    const int16_t* __restrict qy = block.normal[1] + first_lane;
-    const int16_t* __restrict qz = block.normal[2] + first_lane;
-    const uint8_t* __restrict strata = block.stratum + first_lane;
-    float* __restrict out_x = out.x;
-    float* __restrict out_y = out.y;
-    float* __restrict out_z = out.z;
-    uint8_t* __restrict keep = out.keep;
-    const int count = out.count;
-    // Table look-ups stay out of the vector loop.
-    float front[kBlockPoints], back[kBlockPoints];
-    for (int i = 0; i < count; ++i) {
-        front[i] = p.gain_front[strata[i]];
-        back[i] = p.gain_back[strata[i]];
-    }
-    for (int i = 0; i < count; ++i) {
+    const uint16_t* __restrict px = list.position[0] + first_lane;
+    const uint16_t* __restrict py = list.position[1] + first_lane;
+    const uint16_t* __restrict pz = list.position[2] + first_lane;
+    const int16_t* __restrict qx = list.normal[0] + first_lane;
+    const int16_t* __restrict qy = list.normal[1] + first_lane;
+    const int16_t* __restrict qz = list.normal[2] + first_lane;
+    const uint8_t* __restrict widths = list.width + first_lane;
+    const uint8_t* __restrict single_sided = list.single_sided + first_lane;
+    float* __restrict out_x = out.x + lane;
+    float* __restrict out_y = out.y + lane;
+    float* __restrict out_z = out.z + lane;
+    uint32_t* __restrict number = out.number + lane;
+    uint8_t* __restrict keep = out.keep + lane;
+    uint8_t* __restrict width = out.width + lane;
+    const int n = (count + kBlockPadding - 1) & -kBlockPadding;  // whole vectors
+    const int offset = p.width_offset, widest = p.narrow ? int(kNoPatch) : kWidthCodes - 1;
+    for (int i = 0; i < n; ++i)
+        width[i] = uint8_t(std::min(std::max(int(widths[i]) + offset, 1), widest));
+    for (int i = 0; i < n; ++i) {
         const float dx = bx + sx * float(px[i]), dy = by + sy * float(py[i]),
                     dz = bz + sz * float(pz[i]);
         const float nx = float(qx[i]), ny = float(qy[i]), nz = float(qz[i]);
@@ -60,15 +55,17 @@ inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
         // Minus the cosine to the way of the eye: positive when facing it.
         const float facing =
             kOrthographic ? -(nx * fx + ny * fy + nz * fz) : -(nx * dx + ny * dy + nz * dz);
-        const float seen = std::max(facing * front[i], -facing * back[i]);
-        const float probability = kOrthographic ? seen : seen / (z * z * z);
+        const float seen = single_sided[i] ? facing : std::abs(facing);
+        const float scaled = gain * seen;
+        const float probability = kOrthographic ? scaled : scaled / (z * z * z);
         const uint32_t index = first_index + uint32_t(i);
         const uint32_t bits =
-            kRandom ? mix32(index * 0x9e3779b9u ^ hash) : index * 0x9e3779b9u + hash;
+            kRandom ? mixBits32(index * 0x9e3779b9u ^ hash) : index * 0x9e3779b9u + hash;
         const float threshold = float(int(bits >> 8)) * 0x1p-24f;
         out_x[i] = x;
         out_y[i] = y;
         out_z[i] = z;
+        number[i] = first_number + uint32_t(i);
         keep[i] = uint8_t((probability > threshold) & (z > z_near));
     }
 }
@@ -76,14 +73,17 @@ inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
 }  // namespace
 
 __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void transformPoints(
-    const KernelParams& params, const ListBlock& block, int first_lane, uint32_t first_index,
-    PointBlock& out) {
+    const KernelParams& params, const ListBlock& list, int first_lane, uint32_t first_index,
+    int count, uint32_t first_number, int lane, PointBlock& out) {
+    const auto& l = list;
+    const int f = first_lane;
+    const uint32_t i = first_index, number = first_number;
     if (params.orthographic) {
-        params.random ? transformLoop<true, true>(params, block, first_lane, first_index, out)
-                      : transformLoop<true, false>(params, block, first_lane, first_index, out);
+        params.random ? transformLoop<true, true>(params, l, f, i, count, number, lane, out)
+                      : transformLoop<true, false>(params, l, f, i, count, number, lane, out);
     } else {
-        params.random ? transformLoop<false, true>(params, block, first_lane, first_index, out)
-                      : transformLoop<false, false>(params, block, first_lane, first_index, out);
+        params.random ? transformLoop<false, true>(params, l, f, i, count, number, lane, out)
+                      : transformLoop<false, false>(params, l, f, i, count, number, lane, out);
     }
 }
 

@@ -15,18 +15,21 @@ struct KernelParams {
     Mat3 camera_from_object = Mat3(1.0f);
     bool orthographic = false;
     Vec3 facing = Vec3(0);  // orthographic: object-space vector d with prj = f^2 |n.d|
-    // By stratum: times |n.d| (/ z^3 in perspective; n is unit * 32767) this is the probability to
-    // keep a point seen from the front or from behind. 0 where nothing shall be seen.
-    alignas(64) float gain_front[16] = {};
-    alignas(64) float gain_back[16] = {};
-    float z_near = 0.0f;  // nearer points are dropped
-    bool random = false;  // thinning numbers: hashed, or a golden-ratio sequence
+    float gain = 0.0f;      // times |n.d| (/ z^3 in perspective; n is unit * 32767) this is the
+                            // probability to keep a point
+    float z_near = 0.0f;    // nearer points are dropped
+    bool random = false;    // thinning numbers: hashed, or a golden-ratio sequence
     uint32_t hash = 0;
+    int width_offset = 0;  // takes width codes of metres to those of subpixels
+    bool narrow = false;   // widths become kNoPatch
 };
 
-// Fills out.x, y, z and keep for lanes [0, out.count) from list lanes [first_lane, first_lane +
-// count); first_index is the list index of the first. Same bits on every instruction set.
-void transformPoints(const KernelParams& params, const ListBlock& block, int first_lane,
-                     uint32_t first_index, PointBlock& out);
+// Points [first_index, first_index + count) of a node's sequence, which are the lanes [first_lane,
+// first_lane + count) of `list`, become lanes [lane, lane + count) of `out`, numbered from
+// first_number. first_lane is a multiple of 16; lanes of `out` up to the next multiple of 16 may be
+// overwritten. Same bits on every instruction set.
+void transformPoints(const KernelParams& params, const ListBlock& list, int first_lane,
+                     uint32_t first_index, int count, uint32_t first_number, int lane,
+                     PointBlock& out);
 
 }  // namespace stipple

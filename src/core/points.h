@@ -10,6 +10,8 @@
 #include <core/settings.h>
 #include <core/surface.h>
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -45,18 +47,31 @@ inline constexpr uint32_t kZBufferBit = 0x80000000u;   // a triangle of the fram
 inline constexpr uint32_t kTriangleBit = 0x40000000u;  // a triangle emitted in the tile
 inline constexpr uint32_t kKindBits = kZBufferBit | kTriangleBit;
 
-// Up to 64 points in camera space, structure of arrays. Point i has the number first_number + i
-// within its tile.
+// Kernels work on whole vectors and may write this far beyond a block's last point.
+inline constexpr int kBlockPadding = 16;
+
+// Width of the connected patch a point lies on (a leaf, a terrain), logarithmic in 8 bits: code c
+// stands for about 2^(first_exponent + c / 8).
+inline constexpr int kWidthsPerOctave = 8, kWidthCodes = 256;
+inline uint8_t patchWidthCode(float width, int first_exponent) {
+    // Exponent and the first three bits of the mantissa.
+    const int bits =
+        int(std::bit_cast<uint32_t>(width) >> 20) - ((127 + first_exponent) * kWidthsPerOctave);
+    return uint8_t(std::clamp(bits, 1, kWidthCodes - 1));
+}
+// In subpixels. Code 0, kNoPatch, is kept for points that cover just the subpixel they lie in.
+inline constexpr int kFirstSubpixelExponent = -8;
+inline constexpr uint8_t kNoPatch = 0;
+
+// Up to 64 points in camera space, structure of arrays.
 struct PointBlock {
     int count = 0;
-    uint32_t first_number = 0;
-    const uint8_t* stratum = nullptr;  // index into `patch`, one a point
-    const float* patch = nullptr;      // width of the connected patch a point lies on, in subpixels
-    int patch_count = 0;               // at most 16
-    alignas(64) float x[kBlockPoints];
-    alignas(64) float y[kBlockPoints];
-    alignas(64) float z[kBlockPoints];
-    alignas(64) uint8_t keep[kBlockPoints];  // 1: kept by thinning, 0: not there
+    alignas(64) float x[kBlockPoints + kBlockPadding];
+    alignas(64) float y[kBlockPoints + kBlockPadding];
+    alignas(64) float z[kBlockPoints + kBlockPadding];
+    alignas(64) uint32_t number[kBlockPoints + kBlockPadding];  // names the point within its tile
+    alignas(64) uint8_t keep[kBlockPoints + kBlockPadding];     // 1: kept by thinning, 0: not there
+    alignas(64) uint8_t width[kBlockPoints + kBlockPadding];    // patchWidthCode(), in subpixels
 };
 
 // Says whether a triangle of a block has surface at a subpixel (alpha masks).
@@ -88,8 +103,9 @@ public:
     virtual bool take(const PointBlock& block) = 0;
     virtual bool take(const TriangleBlock& block) = 0;
     // True if nothing within the rectangle at or behind z_min can change the picture of this tile:
-    // sources ask before they open a node.
-    virtual bool hides(const SubpixelRect& rect, float z_min) = 0;
+    // sources ask before they open a node. narrow: no point of it will cover more than the subpixel
+    // it lies in (kNoPatch).
+    virtual bool hides(const SubpixelRect& rect, float z_min, bool narrow) = 0;
     virtual const SubpixelRect& region() const = 0;  // subpixels the sink wants, tile and halo
 };
 
@@ -98,7 +114,7 @@ class TileEmitter {
 public:
     virtual ~TileEmitter() = default;
     // Pushes what the batch has within the sink's region, near before far, leaving out what the
-    // sink hides. The same points every time, but for first_number.
+    // sink hides. The same points every time, but for their numbers.
     virtual void emit(const Batch& batch, PointSink& sink) = 0;
     // Normal, albedo, material and object of an emitted point or triangle, seen at sub_x, sub_y
     // (subpixel coordinates) at sample.depth.

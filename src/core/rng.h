@@ -19,6 +19,15 @@ inline uint64_t mixBits(uint64_t v) {
     return v;
 }
 
+// The same in 32 bits, for vector loops: a cheap integer hash with good avalanche (low bias).
+inline uint32_t mixBits32(uint32_t v) {
+    v ^= v >> 16;
+    v *= 0x7feb352du;
+    v ^= v >> 15;
+    v *= 0x846ca68bu;
+    return v ^ v >> 16;
+}
+
 inline uint64_t hashCombine(uint64_t key, uint64_t value) {
     return mixBits(key * 0x9e3779b97f4a7c15ull + value + 0x632be59bd9b4e019ull);
 }

@@ -33,7 +33,7 @@ public:
             ++drawn;
             if (!block.keep[i]) continue;
             points.push_back(Vec3(block.x[i], block.y[i], block.z[i]));
-            numbers.push_back(block.first_number + uint32_t(i));
+            numbers.push_back(block.number[i]);
         }
         return true;
     }
@@ -41,7 +41,7 @@ public:
         triangles += size_t(block.count);
         return true;
     }
-    bool hides(const SubpixelRect&, float) override { return false; }
+    bool hides(const SubpixelRect&, float, bool) override { return false; }
     const SubpixelRect& region() const override { return region_; }
 
     std::vector<Vec3> points;
@@ -76,6 +76,11 @@ Scene planeScene(const Affine& inner, const Affine& outer, int inner_copies) {
     ThreadPool pool(1);
     buildScene(scene, pool);
     return scene;
+}
+
+MeshPoint pointOf(const Mesh& mesh, Sampler sampler, uint64_t list, uint32_t index) {
+    const PointKey key{sampler, list, index};
+    return meshPointAt(mesh, mesh.nodes[0], listPosition(key), key);
 }
 
 struct Drawn {
@@ -208,8 +213,7 @@ TEST(SamplingUniform, trianglesOfAMeshByTheirArea) {
     const Mesh& mesh = rock.mesh;
     const uint32_t n = 400000;
     std::vector<double> counts(mesh.triangles.size(), 0.0), expected;
-    for (uint32_t i = 0; i < n; ++i)
-        ++counts[drawMeshPoint(mesh, mesh.nodes[0], Sampler::kRandom, 77, i).triangle];
+    for (uint32_t i = 0; i < n; ++i) ++counts[pointOf(mesh, Sampler::kRandom, 77, i).triangle];
     for (size_t t = 0; t < counts.size(); ++t) {
         expected.push_back(n * (mesh.cumulative_area[t + 1] - mesh.cumulative_area[t]) / mesh.area);
     }
@@ -225,7 +229,7 @@ TEST(SamplingUniform, everyStratifiedPrefixIsWellSpread) {
     const auto emptyShare = [&](Sampler sampler, uint32_t n) {
         std::vector<bool> hit(kSide * kSide, false);
         for (uint32_t i = 0; i < n; ++i) {
-            const MeshPoint p = drawMeshPoint(mesh, mesh.nodes[0], sampler, 5, i);
+            const MeshPoint p = pointOf(mesh, sampler, 5, i);
             const UVec3& t = mesh.triangles[p.triangle];
             const Vec3 q = mesh.positions[t.x] * (1 - p.u - p.v) + mesh.positions[t.y] * p.u +
                            mesh.positions[t.z] * p.v;

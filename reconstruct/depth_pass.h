@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points and triangles into the z-buffer of a tile: the first pass of every reconstruction that
+// keeps the nearest. Based on: Wand et al. 2001 ("Per-Pixel Reconstruction", "Splatting").
+#pragma once
+
+#include <reconstruct/depth_tile.h>
+#include <reconstruct/footprint.h>
+#include <reconstruct/reconstruction.h>
+
+namespace stipple {
+
+class DepthPass {
+public:
+    // splat_subpixels: side of the square of constant depth that a point covers; 0: chosen by the
+    // patch it lies on (footprint.h).
+    DepthPass(const ReconstructionContext& context, int splat_subpixels);
+    void begin(const SubpixelRect& inner);
+    // False if none of the block is in front.
+    bool take(const PointBlock& block, DepthTile& tile);
+    bool take(const TriangleBlock& block, DepthTile& tile);
+    // How many subpixels beyond the one it lies in a point may cover.
+    int reach(bool narrow) const { return narrow && !is_splat_ ? 0 : side_ / 2; }
+    const TileCounters& counters() const { return counters_; }
+    // Kept points a pixel of the tile, if asked for.
+    const std::vector<uint16_t>& counts() const { return counts_; }
+
+private:
+    bool splat(DepthTile& tile, float sub_x, float sub_y, uint64_t key) const;
+    void count(float sub_x, float sub_y);
+    void refreshAfter(uint64_t subpixels, DepthTile& tile);
+
+    const ReconstructionContext& context_;
+    const bool is_splat_;
+    const int side_;  // of the square a wide point covers
+    FootprintTable footprints_;
+    const bool wants_counts_;
+    SubpixelRect inner_;
+    TileCounters counters_;
+    std::vector<uint16_t> counts_;
+    uint64_t since_refresh_ = 0;
+};
+
+}  // namespace stipple

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sampling/group_points.h>
+
+#include <core/rng.h>
+#include <scenegraph/object_id.h>
+
+#include <bit>
+
+namespace stipple {
+
+void GroupPoints::draw(ChildRef ref, uint32_t node_index, const Affine& camera_from_group,
+                       uint64_t path, const RunDensity& density) {
+    const GroupNode& node = context_.scene.groups[ref.index()].nodes[node_index];
+    const uint64_t key = hashCombine(context_.settings.seed, path, ref.bits, node_index);
+    const uint64_t count = roundAtRandom(density.drawn * node.area, key);
+    if (count == 0) return;
+    density_ = density;
+    if (context_.settings.sampler == Sampler::kRandom) {
+        for (uint64_t k = 0; k < count; ++k) {
+            const uint64_t h = hashCombine(key, k, 1);
+            drawOne(ref, node_index, camera_from_group, path, 1.0, uniformDouble(h),
+                    uint32_t(mixBits(h)));
+        }
+    } else {
+        spacing_ = node.area / double(count);
+        phase_ = uniformDouble(mixBits(key));
+        sweep(ref, node_index, camera_from_group, path, 0.0, 1.0);
+    }
+}
+
+// Systematic sampling: the node's points lie at (k + phase) * spacing along the cumulated areas of
+// everything below it, in octree order. Passes a range on to whom it belongs, so only subtrees with
+// points are visited; what has a list long enough is drawn from it.
+void GroupPoints::sweep(ChildRef ref, uint32_t node_index, const Affine& camera_from_group,
+                        uint64_t path, double base, double scale) {
+    const Group& group = context_.scene.groups[ref.index()];
+    const GroupNode& node = group.nodes[node_index];
+    if (context_.lists.hasLists(ref)) {
+        const uint64_t count = pointsBefore(base + node.area * scale) - pointsBefore(base);
+        if (count <= kLongestList) {
+            drawList(camera_from_group, ref, node_index, path, scale, uint32_t(count));
+            return;
+        }
+    }
+    for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
+        const ChildRef child = group.instances.child(i);
+        const double child_scale = scale * group.instances.areaScale(i);
+        const double end = base + childArea(child) * child_scale;
+        const uint64_t count = pointsBefore(end) - pointsBefore(base);
+        if (count > 0) {
+            const Affine camera_from_child = camera_from_group * group.instances.groupFromChild(i);
+            const uint64_t child_path = extendObjectPath(path, group.listed_index[i]);
+            if (child.isGroup()) {
+                sweep(child, 0, camera_from_child, child_path, base, child_scale);
+            } else {
+                drawList(camera_from_child, child, 0, child_path, child_scale, uint32_t(count));
+            }
+        }
+        base = end;
+    }
+    for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c) {
+        const double end = base + group.nodes[c].area * scale;
+        if (pointsBefore(end) > pointsBefore(base))
+            sweep(ref, c, camera_from_group, path, base, scale);
+        base = end;
+    }
+}
+
+uint64_t GroupPoints::pointsBefore(double position) const {
+    return uint64_t(std::max(0.0, std::ceil(position / spacing_ - phase_)));
+}
+
+double GroupPoints::childArea(ChildRef child) const {
+    return child.isGroup() ? context_.scene.groups[child.index()].area
+                           : context_.scene.meshes[child.index()].area;
+}
+
+RunDensity GroupPoints::childDensity(double scale) const {
+    RunDensity density = density_;
+    density.drawn *= scale;
+    return density;
+}
+
+// One point at `position`, in [0, 1), along the cumulated areas: down the trees of sums to an
+// instance of a mesh.
+void GroupPoints::drawOne(ChildRef ref, uint32_t node, const Affine& camera_from_group,
+                          uint64_t path, double scale, double position, uint32_t index) {
+    const Group& group = context_.scene.groups[ref.index()];
+    const InstancePoint at = instanceAt(context_.scene, group, node, position);
+    const ChildRef child = group.instances.child(at.instance);
+    const Affine camera_from_child =
+        camera_from_group * group.instances.groupFromChild(at.instance);
+    const uint64_t child_path = extendObjectPath(path, group.listed_index[at.instance]);
+    const double child_scale = scale * group.instances.areaScale(at.instance);
+    if (child.isGroup()) {
+        drawOne(child, 0, camera_from_child, child_path, child_scale, at.position, index);
+    } else {
+        points_.add(makeInstanceFrame(camera_from_child, child_path), child, 0,
+                    childDensity(child_scale), index, 1);
+    }
+}
+
+namespace {
+
+// Bound of the projection factor over an instance, by its bounding sphere; infinite near the eye.
+double instanceBound(const View& view, const InstanceFrame& frame, const Box3& bounds) {
+    const double f2 = view.focal * view.focal * frame.area_scale;
+    if (view.orthographic) return f2;
+    const DVec3 c = frame.camera_from_object.point(DVec3(bounds.center()));
+    const double r =
+        0.5 * glm::length(DVec3(bounds.extent())) * maxLengthScale(frame.camera_from_object.linear);
+    const double z = c.z - r;
+    if (z < view.near_z) return std::numeric_limits<double>::infinity();
+    const double x = (std::abs(c.x) + r) / z, y = (std::abs(c.y) + r) / z;
+    return f2 * std::sqrt(1.0 + x * x + y * y) / (z * z);
+}
+
+}  // namespace
+
+// Some points of a whole mesh or of a group's node within a far group: an aligned piece of its
+// list, another one for each instance, so that equal trees do not show equal points.
+void GroupPoints::drawList(const Affine& camera_from_child, ChildRef child, uint32_t node,
+                           uint64_t path, double scale, uint32_t count) {
+    if (count == 0) return;
+    const Scene& scene = context_.scene;
+    const InstanceFrame frame = makeInstanceFrame(camera_from_child, path);
+    // The group's node was drawn for its nearest corner; this instance may need fewer.
+    RunDensity density = childDensity(scale);
+    const Box3& bounds = child.isGroup() ? scene.groups[child.index()].nodes[node].bounds
+                                         : scene.meshes[child.index()].nodes[node].bounds;
+    const double needed = density.wanted * instanceBound(context_.view, frame, bounds);
+    if (needed < density.drawn) {
+        count = uint32_t(roundAtRandom(count * (needed / density.drawn),
+                                       hashCombine(context_.settings.seed, path, node)));
+        density.drawn = needed;
+    }
+    const uint32_t piece = std::max(16u, std::bit_ceil(count));
+    const uint32_t length = uint32_t(context_.settings.list_length);
+    const uint32_t first = piece * 2 <= length ? uint32_t(path >> 8) % (length / piece) * piece : 0;
+    points_.add(frame, child, node, density, first, count);
+}
+
+}  // namespace stipple

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where point `index` of a node's sequence lies: along the cumulated areas to an instance, a
+// triangle and a place on it. Based on: Wand et al. 2001 ("Precomputation: Distribution List");
+// van der Corput sequence; Basu, Owen. Low discrepancy constructions in the triangle. 2015 (the
+// remainder steers a 4-way subdivision of the triangle).
+#pragma once
+
+#include <core/settings.h>
+#include <scenegraph/scene.h>
+
+namespace stipple {
+
+// Names one point's random numbers.
+struct PointKey {
+    Sampler sampler = Sampler::kStratified;
+    uint64_t list = 0;  // hash of the node
+    uint32_t index = 0;
+};
+
+// Where point `index` lies along the cumulated areas, in [0, 1): van der Corput with a random
+// shift, or random.
+double listPosition(const PointKey& key);
+
+// Where on a mesh a point lies.
+struct MeshPoint {
+    uint32_t triangle = 0;
+    float u = 0.0f, v = 0.0f;
+};
+
+// The place at `position`, in [0, 1), along the areas of a mesh's node: uniform over its area if
+// the position is.
+MeshPoint meshPointAt(const Mesh& mesh, const MeshNode& node, double position, const PointKey& key);
+
+// An instance below a group's node.
+struct InstancePoint {
+    uint32_t instance = 0;
+    double position = 0.0;  // along the areas of its child, in [0, 1)
+};
+
+// The instance at `position`, in [0, 1), along the areas (each the child's times the transform's
+// largest area scale) below a node. O(log n).
+InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node, double position);
+
+}  // namespace stipple

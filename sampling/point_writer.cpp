@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sampling/point_writer.h>
+
+#include <core/rng.h>
+#include <sampling/transform_kernel.h>
+
+#include <bit>
+
+namespace stipple {
+
+namespace {
+
+// Lists grow by powers of two.
+uint32_t listLength(uint64_t end) {
+    return uint32_t(std::min<uint64_t>(std::bit_ceil(end), kLongestList));
+}
+
+KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, ChildRef child,
+                        uint32_t node_index, const RunDensity& density) {
+    const View& view = context.view;
+    const Box3& bounds = child.isGroup()
+                             ? context.scene.groups[child.index()].nodes[node_index].bounds
+                             : context.scene.meshes[child.index()].nodes[node_index].bounds;
+    KernelParams params;
+    params.box_from_eye = Vec3(DVec3(bounds.min) - frame.eye_object);
+    params.step = bounds.extent() / 65535.0f;
+    params.camera_from_object = Mat3(frame.camera_from_object.linear);
+    params.orthographic = view.orthographic;
+    params.facing = Vec3(frame.facing);
+    params.z_near = view.near_z;
+    params.random = context.settings.sampler == Sampler::kRandom;
+    params.hash = uint32_t(hashCombine(context.settings.seed, frame.path, node_index, 2));
+    // The probability to keep a point is K * prj / density.
+    const double f2 = view.focal * view.focal;
+    params.gain = float(density.wanted * f2 * (view.orthographic ? 1.0 : frame.volume_scale) /
+                        (32767.0 * density.drawn));
+    params.narrow = density.narrow;
+    const DVec3 center = frame.camera_from_object.point(DVec3(bounds.center()));
+    const double z = view.orthographic ? 1.0 : std::max(center.z, double(view.near_z));
+    const double to_subpixels = std::sqrt(frame.area_scale * f2) / z;
+    params.width_offset = int(std::lround(std::log2(to_subpixels) * kWidthsPerOctave)) +
+                          (kFirstMetreExponent - kFirstSubpixelExponent) * kWidthsPerOctave;
+    return params;
+}
+
+}  // namespace
+
+void PointWriter::add(const InstanceFrame& frame, ChildRef child, uint32_t node,
+                      const RunDensity& density, uint32_t first, uint32_t count) {
+    if (count == 0) return;
+    const KernelParams params = makeParams(context_, frame, child, node, density);
+    Run run;
+    run.camera_from_normal = frame.camera_from_normal;
+    run.child = child;
+    run.node = node;
+    run.list_length = params.random ? 0 : listLength(uint64_t(first) + count);
+    run.path = frame.path;
+    while (count > 0) {
+        const uint32_t n = std::min(count, kBlockPoints - first % kBlockPoints);
+        if (block_.count + int(n) > kBlockPoints) flush();
+        if (block_.count == 0) first_run_ = context_.runs.size();
+        int lane;
+        const ListBlock& list =
+            context_.lists.points(child, node, first, int(n), run.list_length, scratch_, lane);
+        transformPoints(params, list, lane, first, int(n), context_.nextNumber(), block_.count,
+                        block_);
+        run.first_index = first;
+        context_.runs.push_back(run);
+        block_.count += int(n);
+        first += n;
+        count -= n;
+    }
+}
+
+void PointWriter::flush() {
+    if (block_.count > 0 && !context_.sink->take(block_)) context_.runs.resize(first_run_);
+    block_.count = 0;
+}
+
+}  // namespace stipple

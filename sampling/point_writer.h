@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Draws points of nodes into the sink, 64 at a time, from as many instances as it takes.
+// Based on: Wand et al. 2001 ("Sample caching").
+#pragma once
+
+#include <sampling/tile_context.h>
+
+namespace stipple {
+
+// How densely a node is drawn, and thinned.
+struct RunDensity {
+    double drawn = 0.0;   // points per m^2 of object space
+    double wanted = 0.0;  // kept points per subpixel of exactly projected area (K, or less where
+                          // no one could tell)
+    bool narrow = false;  // points cover no more than the subpixel they lie in
+};
+
+class PointWriter {
+public:
+    explicit PointWriter(TileContext& context) : context_(context) {}
+
+    // Points [first, first + count) of the sequence of a node of an instance's mesh or group; first
+    // is a multiple of 16, unless the sampler is random.
+    void add(const InstanceFrame& frame, ChildRef child, uint32_t node, const RunDensity& density,
+             uint32_t first, uint32_t count);
+    // Hands over what has gathered.
+    void flush();
+
+private:
+    TileContext& context_;
+    size_t first_run_ = 0;  // of the block
+    PointBlock block_;
+    ListBlock scratch_;
+};
+
+}  // namespace stipple

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the parts that draw one tile share: the frame, the sink, and what numbers stand for.
+#pragma once
+
+#include <core/points.h>
+#include <sampling/instance_frame.h>
+#include <sampling/point_list.h>
+#include <scenegraph/scene.h>
+
+#include <vector>
+
+namespace stipple {
+
+inline constexpr uint32_t kNotTriangles = 0xffffffffu;
+
+// What attributes() must know of 64 consecutive numbers.
+struct Run {
+    Mat3 camera_from_normal = Mat3(1.0f);
+    ChildRef child;  // mesh or group
+    uint32_t node = 0;
+    uint32_t first_index = 0;  // of the node's list, or of the mesh's triangles
+    uint32_t list_length = 0;
+    uint64_t path = 0;                        // of the mesh's or the group's instance
+    uint32_t triangle_frame = kNotTriangles;  // index into triangle_frames
+};
+
+struct TileContext {
+    const Scene& scene;
+    const View& view;
+    const RenderSettings& settings;
+    PointLists& lists;
+    PointSink* sink = nullptr;
+    std::vector<Run> runs;
+    std::vector<InstanceFrame> triangle_frames;
+
+    uint32_t nextNumber() const { return uint32_t(runs.size()) * kBlockPoints; }
+    const Run& runOf(uint32_t number) const { return runs[(number & ~kKindBits) / kBlockPoints]; }
+};
+
+}  // namespace stipple

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sampling/tile_cut.h>
+
+#include <core/rng.h>
+#include <sampling/node_class.h>
+#include <scenegraph/object_id.h>
+
+#include <algorithm>
+#include <tuple>
+
+namespace stipple {
+
+TileCut::TileCut(const Scene& scene, const View& view, const RenderSettings& settings,
+                 const FramePlan& plan, PointLists& lists)
+    : context_{scene, view, settings, lists, nullptr, {}, {}},
+      plan_(plan),
+      world_from_camera_(glm::transpose(view.camera_from_world)),
+      points_(context_),
+      group_points_(context_, points_),
+      triangles_(context_) {}
+
+void TileCut::emit(const Batch& batch, PointSink& sink) {
+    const PlannedNode& planned = plan_.nodes[batch.index];
+    const Affine& camera_from_child = planned.camera_from_child;
+    context_.sink = &sink;
+    const Scene& scene = context_.scene;
+    const Box3& bounds = planned.child.isGroup()
+                             ? scene.groups[planned.child.index()].nodes[planned.node].bounds
+                             : scene.meshes[planned.child.index()].nodes[planned.node].bounds;
+    const BoxProjection box =
+        projectBox(context_.view, camera_from_child.linear, camera_from_child.translation, bounds);
+    if (planned.child.isGroup()) {
+        drawGroupNode(planned.child, planned.node, camera_from_child, planned.path, box);
+    } else {
+        drawMesh(planned.child.index(), planned.node, camera_from_child, planned.path, box);
+    }
+    points_.flush();
+}
+
+void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample) const {
+    const Run& run = context_.runOf(number);
+    const uint32_t index = run.first_index + number % kBlockPoints;
+    if (run.triangle_frame != kNotTriangles) {
+        triangleAttributes(context_.scene, context_.view,
+                           context_.triangle_frames[run.triangle_frame], run.child.index(), index,
+                           sub_x, sub_y, sample);
+        return;
+    }
+    int lane;
+    ListBlock scratch;
+    const ListBlock& list =
+        context_.lists.points(run.child, run.node, index, 1, run.list_length, scratch, lane);
+    sample.normal_world =
+        glm::normalize(world_from_camera_ *
+                       (run.camera_from_normal * unpackOctahedral(list.shading_normal[lane])));
+    sample.albedo = unpackSrgb8(list.albedo[lane]);
+    sample.material = list.material[lane];
+    sample.object =
+        objectId(run.child.isGroup() ? extendObjectPath(run.path, list.slot[lane]) : run.path);
+}
+
+void TileCut::forget() {
+    context_.runs.clear();
+    context_.triangle_frames.clear();
+    points_.flush();
+}
+
+void TileCut::collect(const Affine& camera_from_child, const Box3& bounds, uint32_t index,
+                      bool is_instance) {
+    const BoxProjection box =
+        projectBox(context_.view, camera_from_child.linear, camera_from_child.translation, bounds);
+    if (box.is_visible && box.rect.overlaps(context_.sink->region()))
+        opened_.push_back({box, index, is_instance});
+}
+
+void TileCut::sortCollected(size_t begin) {
+    std::sort(opened_.begin() + ptrdiff_t(begin), opened_.end(),
+              [](const Opened& a, const Opened& b) {
+                  return std::tie(a.box.z_min, a.is_instance, a.index) <
+                         std::tie(b.box.z_min, b.is_instance, b.index);
+              });
+}
+
+// A node of a group: points, if all of it is far enough, else what it opens to.
+void TileCut::drawGroupNode(ChildRef ref, uint32_t node_index, const Affine& camera_from_group,
+                            uint64_t path, const BoxProjection& box) {
+    const Scene& scene = context_.scene;
+    const Group& group = scene.groups[ref.index()];
+    const GroupNode& node = group.nodes[node_index];
+    if (!box.is_visible || !(node.area > 0.0) || !box.rect.overlaps(context_.sink->region()) ||
+        drawAsPoints(ref, node_index, camera_from_group, path, box) || isHidden(box))
+        return;
+    const size_t begin = opened_.size();
+    for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
+        const ChildRef child = group.instances.child(i);
+        collect(camera_from_group * group.instances.groupFromChild(i),
+                child.isGroup() ? scene.groups[child.index()].nodes[0].bounds
+                                : scene.meshes[child.index()].bounds,
+                i, true);
+    }
+    for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c)
+        collect(camera_from_group, group.nodes[c].bounds, c, false);
+    sortCollected(begin);
+    const size_t end = opened_.size();
+    for (size_t k = begin; k < end; ++k) {
+        const Opened o = opened_[k];
+        if (!o.is_instance) {
+            drawGroupNode(ref, o.index, camera_from_group, path, o.box);
+            continue;
+        }
+        const ChildRef child = group.instances.child(o.index);
+        if (!child.isGroup() && isHidden(o.box)) continue;
+        const Affine camera_from_child =
+            camera_from_group * group.instances.groupFromChild(o.index);
+        const uint64_t child_path = extendObjectPath(path, group.listed_index[o.index]);
+        if (child.isGroup()) {
+            drawGroupNode(child, 0, camera_from_child, child_path, o.box);
+        } else {
+            drawMesh(child.index(), 0, camera_from_child, child_path, o.box);
+        }
+    }
+    opened_.resize(begin);
+}
+
+// False if the node must be opened.
+bool TileCut::drawAsPoints(ChildRef ref, uint32_t node_index, const Affine& camera_from_group,
+                           uint64_t path, const BoxProjection& box) {
+    const RenderSettings& settings = context_.settings;
+    const GroupNode& node = context_.scene.groups[ref.index()].nodes[node_index];
+    if (node.count <= 1 || box.depth_ratio > settings.cut_ratio) return false;
+    const double bound = box.bound * maxAreaScale(camera_from_group.linear);
+    if (node.max_triangle_area * bound > settings.area_threshold) return false;
+    const double n = settings.samples * bound * node.area;
+    if (box.size > kTileShare * float(settings.tile_size) && n > kFewPoints) return false;
+    const double most = kMostOverdraw * double(box.rect.width()) * double(box.rect.height());
+    RunDensity density;
+    density.wanted = settings.samples;
+    const double overdraw = bound * node.area / most;
+    if (overdraw > 1.0) {
+        if (box.thickness > kThinNode) return false;
+        density.wanted /= overdraw;
+        density.narrow = true;
+    }
+    density.drawn = density.wanted * bound;
+    if (!context_.sink->hides(box.rect, box.z_min, density.narrow))
+        group_points_.draw(ref, node_index, camera_from_group, path, density);
+    return true;
+}
+
+void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& camera_from_object,
+                       uint64_t path, const BoxProjection& box) {
+    if (context_.scene.meshes[mesh_index].triangles.empty()) return;
+    uint32_t triangle_frame = kNotTriangles;
+    drawMeshNode(makeInstanceFrame(camera_from_object, path), mesh_index, node_index, box,
+                 triangle_frame);
+}
+
+// The cut through a mesh's octree. triangle_frame: where the instance stands in
+// context.triangle_frames, once it does.
+void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, uint32_t node_index,
+                           const BoxProjection& box, uint32_t& triangle_frame) {
+    const RenderSettings& settings = context_.settings;
+    const Mesh& mesh = context_.scene.meshes[mesh_index];
+    const MeshNode& node = mesh.nodes[node_index];
+    switch (classifyNode(node, box, frame.area_scale, settings)) {
+        case NodeClass::kPoints: {
+            RunDensity density;
+            density.wanted = settings.samples;
+            density.drawn = settings.samples * box.bound * frame.area_scale;
+            const uint64_t key = hashCombine(settings.seed, frame.path, mesh_index, node_index);
+            const uint64_t count = roundAtRandom(std::min(density.drawn * node.area, 1e9), key);
+            const bool random = settings.sampler == Sampler::kRandom;
+            const uint32_t first = random ? uint32_t(mixBits(key)) : 0;
+            points_.add(frame, ChildRef::mesh(mesh_index), node_index, density, first,
+                        uint32_t(count));
+            return;
+        }
+        case NodeClass::kTriangles:
+            if (triangle_frame == kNotTriangles) {
+                triangle_frame = uint32_t(context_.triangle_frames.size());
+                context_.triangle_frames.push_back(frame);
+            }
+            points_.flush();
+            triangles_.add(mesh_index, node_index, triangle_frame);
+            return;
+        case NodeClass::kLargeTriangles:
+            return;  // in the z-buffer already
+        case NodeClass::kOpen:
+            break;
+    }
+    const size_t begin = opened_.size();
+    for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c)
+        collect(frame.camera_from_object, mesh.nodes[c].bounds, c, false);
+    sortCollected(begin);
+    const size_t end = opened_.size();
+    for (size_t k = begin; k < end; ++k) {
+        const Opened o = opened_[k];
+        if (!isHidden(o.box)) drawMeshNode(frame, mesh_index, o.index, o.box, triangle_frame);
+    }
+    opened_.resize(begin);
+}
+
+}  // namespace stipple

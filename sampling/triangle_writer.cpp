@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sampling/triangle_writer.h>
+
+#include <core/rng.h>
+#include <scenegraph/object_id.h>
+#include <scenegraph/surface_at.h>
+
+namespace stipple {
+
+namespace {
+
+// Barycentrics (u, v) of the ray's intersection with the triangle's plane, clamped to the triangle.
+Vec2 intersectPlane(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& origin,
+                    const Vec3& direction) {
+    const Vec3 e1 = b - a, e2 = c - a, p = glm::cross(direction, e2), s = origin - a,
+               q = glm::cross(s, e1);
+    const float determinant = glm::dot(e1, p);
+    const float inverse = determinant != 0.0f ? 1.0f / determinant : 0.0f;
+    const float u = std::clamp(glm::dot(s, p) * inverse, 0.0f, 1.0f);
+    return {u, std::clamp(glm::dot(direction, q) * inverse, 0.0f, 1.0f - u)};
+}
+
+}  // namespace
+
+void triangleAttributes(const Scene& scene, const View& view, const InstanceFrame& frame,
+                        uint32_t mesh_index, uint32_t triangle, float sub_x, float sub_y,
+                        SurfaceSample& sample) {
+    const Mesh& mesh = scene.meshes[mesh_index];
+    const UVec3& t = mesh.triangles[triangle];
+    const Mat3 linear(frame.camera_from_object.linear);
+    const Vec3 translation(frame.camera_from_object.translation);
+    Vec3 origin, direction;
+    view.ray(sub_x, sub_y, origin, direction);
+    const Vec2 uv = intersectPlane(linear * mesh.positions[t.x] + translation,
+                                   linear * mesh.positions[t.y] + translation,
+                                   linear * mesh.positions[t.z] + translation, origin, direction);
+    const float footprint =
+        (view.orthographic ? 1.0f : sample.depth) / float(view.focal * std::sqrt(frame.area_scale));
+    const MeshSurface surface =
+        surfaceAt(mesh, scene.materials, scene.textures, triangle, uv.x, uv.y, footprint);
+    sample.normal_world = glm::normalize(Mat3(glm::transpose(view.camera_from_world)) *
+                                         (frame.camera_from_normal * surface.normal_object));
+    sample.albedo = surface.albedo;
+    sample.material = mesh.triangle_material[triangle];
+    sample.object = objectId(frame.path);
+}
+
+// Alpha at a place on a triangle of the block.
+class TriangleWriter::Mask : public MaskTest {
+public:
+    Mask(const TileContext& context, const Run& run, const TriangleBlock& block)
+        : context_(context), run_(run), block_(block) {}
+    bool isSurface(int triangle, float sub_x, float sub_y) const override {
+        const Scene& scene = context_.scene;
+        const uint32_t t = run_.first_index + uint32_t(triangle);
+        const Mesh& mesh = scene.meshes[run_.child.index()];
+        const Material& material = scene.materials[mesh.triangle_material[t]];
+        if (material.alpha_mode == AlphaMode::kOpaque) return true;
+        Vec3 origin, direction;
+        context_.view.ray(sub_x, sub_y, origin, direction);
+        const Vec2 uv = intersectPlane(block_.vertex(0, triangle), block_.vertex(1, triangle),
+                                       block_.vertex(2, triangle), origin, direction);
+        const float alpha = alphaAt(mesh, scene.materials, scene.textures, t, uv.x, uv.y);
+        if (material.alpha_mode == AlphaMode::kMask) return alpha >= material.alpha_cutoff;
+        const uint64_t place =
+            hashCombine(run_.path, t, uint64_t(int64_t(sub_x)), uint64_t(int64_t(sub_y)));
+        return uniformFloat(hashCombine(context_.settings.seed, place)) < alpha;
+    }
+
+private:
+    const TileContext& context_;
+    const Run& run_;
+    const TriangleBlock& block_;
+};
+
+void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t triangle_frame) {
+    const InstanceFrame& frame = context_.triangle_frames[triangle_frame];
+    const Mesh& mesh = context_.scene.meshes[mesh_index];
+    const MeshNode& node = mesh.nodes[node_index];
+    const Stratum& stratum = mesh.strata[node.stratum];
+    const Mat3 linear(frame.camera_from_object.linear);
+    const Vec3 translation(frame.camera_from_object.translation);
+    for (uint32_t first = 0; first < node.triangle_count; first += kBlockPoints) {
+        TriangleBlock& block = block_;
+        block.count = int(std::min<uint32_t>(kBlockPoints, node.triangle_count - first));
+        block.first_number = context_.nextNumber() | kTriangleBit;
+        for (int i = 0; i < block.count; ++i) {
+            const UVec3& t = mesh.triangles[node.first_triangle + first + uint32_t(i)];
+            for (int k = 0; k < 3; ++k) {
+                const Vec3 p = linear * mesh.positions[t[k]] + translation;
+                block.x[k][i] = p.x, block.y[k][i] = p.y, block.z[k][i] = p.z;
+            }
+        }
+        Run run;
+        run.child = ChildRef::mesh(mesh_index);
+        run.first_index = node.first_triangle + first;
+        run.triangle_frame = triangle_frame;
+        run.path = frame.path;
+        context_.runs.push_back(run);
+        if (!stratum.double_sided) dropBackFaces(frame, block);
+        const Mask mask(context_, run, block);
+        block.mask = stratum.masked ? &mask : nullptr;
+        if (!context_.sink->take(block)) context_.runs.pop_back();
+    }
+}
+
+// Single-sided triangles seen from behind become degenerate, so that numbers stay in place.
+void TriangleWriter::dropBackFaces(const InstanceFrame& frame, TriangleBlock& block) const {
+    const bool orthographic = context_.view.orthographic;
+    const float sign = glm::determinant(frame.camera_from_object.linear) < 0.0 ? -1.0f : 1.0f;
+    for (int i = 0; i < block.count; ++i) {
+        const Vec3 a = block.vertex(0, i);
+        const Vec3 n = glm::cross(block.vertex(1, i) - a, block.vertex(2, i) - a) * sign;
+        if ((orthographic ? n.z : glm::dot(n, a)) < 0.0f) continue;
+        for (int k = 1; k < 3; ++k) block.x[k][i] = a.x, block.y[k][i] = a.y, block.z[k][i] = a.z;
+    }
+}
+
+}  // namespace stipple
