@@ -70,7 +70,7 @@ void buildScene(Scene& scene, ThreadPool& pool) {
         buildMesh(scene.meshes[i], scene.materials, scene.path + ": " + scene.meshes[i].name);
     });
     for (uint32_t g : childrenFirst(scene)) {
-        buildGroup(scene, scene.groups[g], scene.path + ": /groups/" + scene.groups[g].name);
+        buildGroup(scene, scene.groups[g], scene.path + ": /groups/" + scene.groups[g].name, pool);
     }
 }
 

@@ -12,14 +12,17 @@ namespace stipple {
 namespace {
 
 InstanceStore scattered(const ScatterParams& params, const HeightField* field = nullptr) {
-    InstanceStore store(scatterDomain(params, field));
-    scatter(params, field, store);
+    const ScatterSurface surface{field, nullptr};
+    InstanceStore store(scatterDomain(params, surface));
+    ThreadPool pool(2);
+    scatter(params, surface, pool, store);
     return store;
 }
 
 InstanceStore placed(const GridParams& params) {
     InstanceStore store(gridDomain(params));
-    placeGrid(params, store);
+    ThreadPool pool(2);
+    placeGrid(params, pool, store);
     return store;
 }
 
@@ -55,8 +58,8 @@ ScatterParams oneKind(uint64_t count) {
 // A ramp along x: slope 45 degrees for x > 0, flat for x < 0.
 HeightField ramp() {
     HeightField field;
-    field.resolution = 101;
-    field.size = 100.0;
+    field.columns = field.rows = 101;
+    field.size = DVec2(100.0);
     for (int j = 0; j < 101; ++j) {
         for (int i = 0; i < 101; ++i) field.heights.push_back(float(std::max(0, i - 50)));
     }
@@ -80,7 +83,7 @@ TEST(ProceduralScatter, placesAboutTheWantedNumber) {
 
 TEST(ProceduralScatter, clusteringKeepsTheMeanOverManyThickets) {
     ScatterParams params = oneKind(200000);
-    params.size = 6000.0;  // 10^4 thickets
+    params.size = DVec2(6000.0);  // 10^4 thickets
     params.clustering = 1.0;
     const InstanceStore store = scattered(params);
     EXPECT_NEAR(double(store.size()), 200000.0, 0.04 * 200000.0);
@@ -99,7 +102,7 @@ TEST(ProceduralScatter, clusteringKeepsTheMeanOverManyThickets) {
 
 TEST(ProceduralScatter, isUniformOverTheSquare) {
     ScatterParams params = oneKind(100000);
-    params.size = 64.0;
+    params.size = DVec2(64.0);
     params.center = DVec2(10.0, -20.0);
     const InstanceStore store = scattered(params);
     constexpr int kSide = 16;
@@ -220,13 +223,14 @@ TEST(ProceduralScatter, refusesNonsense) {
         ScatterParams params = oneKind(10);
         change(params);
         InstanceStore store;
-        EXPECT_THROW(scatter(params, nullptr, store), Error);
+        ThreadPool pool(1);
+        EXPECT_THROW(scatter(params, {}, pool, store), Error);
     };
     refused([](ScatterParams& p) { p.items.clear(); });
     refused([](ScatterParams& p) { p.items[0].weight = 0.0; });
     refused([](ScatterParams& p) { p.items[0].weight = -1.0; });
     refused([](ScatterParams& p) { p.count = uint64_t(1) << 40; });
-    refused([](ScatterParams& p) { p.size = std::nan(""); });
+    refused([](ScatterParams& p) { p.size.x = std::nan(""); });
     refused([](ScatterParams& p) { p.min_scale = 0.0; });
     refused([](ScatterParams& p) { p.clustering = 2.0; });
 }
@@ -288,14 +292,15 @@ TEST(ProceduralGrid, turnsJittersScalesAndRises) {
 
 TEST(ProceduralGrid, refusesNonsense) {
     InstanceStore store;
+    ThreadPool pool(1);
     GridParams params;
     params.count_x = 0;
-    EXPECT_THROW(placeGrid(params, store), Error);
+    EXPECT_THROW(placeGrid(params, pool, store), Error);
     params.count_x = params.count_z = 4000000000u;
-    EXPECT_THROW(placeGrid(params, store), Error);
+    EXPECT_THROW(placeGrid(params, pool, store), Error);
     params.count_x = params.count_z = 2;
     params.spacing_x = std::nan("");
-    EXPECT_THROW(placeGrid(params, store), Error);
+    EXPECT_THROW(placeGrid(params, pool, store), Error);
 }
 
 }  // namespace
