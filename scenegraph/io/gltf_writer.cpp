@@ -315,7 +315,7 @@ void addCamera(tinygltf::Model& model, const Camera& source) {
         camera.type = "perspective";
         camera.perspective.yfov = source.fov_y;
         camera.perspective.znear = source.near_z;
-        if (source.far_z < Camera().far_z) camera.perspective.zfar = source.far_z;
+        camera.perspective.zfar = source.far_z;
     }
     model.cameras.push_back(camera);
     tinygltf::Node node;

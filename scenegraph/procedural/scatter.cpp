@@ -265,14 +265,21 @@ std::vector<Place> keepDistance(std::vector<Place> places, double spacing, uint6
     std::vector<uint32_t> first(n_slots, kNone), next;
     std::vector<Place> kept;
     const auto slot = [&](const DVec3& cell) {
-        return hashCombine(uint64_t(int64_t(cell.x)), uint64_t(int64_t(cell.y)),
-                           uint64_t(int64_t(cell.z))) &
+        const auto whole = [](double x) { return uint64_t(int64_t(x)); };
+        return mixBits(whole(cell.x) * 0x9e3779b97f4a7c15ull +
+                       whole(cell.y) * 0xc2b2ae3d27d4eb4full +
+                       whole(cell.z) * 0x165667b19e3779f9ull) &
                (n_slots - 1);
     };
+    // The cell itself first, corners last: most places are refused, and by who is near.
+    std::array<DVec3, 27> neighbours;
+    for (int i = 0; i < 27; ++i) neighbours[size_t(i)] = DVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    std::stable_sort(neighbours.begin(), neighbours.end(), [](const DVec3& a, const DVec3& b) {
+        return glm::dot(a, a) < glm::dot(b, b);
+    });
     const auto isFree = [&](const DVec3& p, const DVec3& cell) {
-        for (int i = 0; i < 27; ++i) {
-            const DVec3 other = cell + DVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-            for (uint32_t k = first[slot(other)]; k != kNone; k = next[k]) {
+        for (const DVec3& step : neighbours) {
+            for (uint32_t k = first[slot(cell + step)]; k != kNone; k = next[k]) {
                 const DVec3 d = kept[k].position - p;
                 if (glm::dot(d, d) < spacing * spacing) return false;
             }

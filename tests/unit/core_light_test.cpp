@@ -56,8 +56,7 @@ TEST(CoreLight, pointLightsShadeSurfacesWhereverTheSceneIs) {
         const Vec3 below = shadedFloor(lighting, origin + DVec3(1, 5, 0), origin);
         EXPECT_NEAR(below.x, 1.0 / kPi, 1e-3);
         // 2 m aside: a distance of sqrt(8), at 45 degrees.
-        const Vec3 aside =
-            shadedFloor(lighting, origin + DVec3(1, 5, 0), origin + DVec3(2, 0, 0));
+        const Vec3 aside = shadedFloor(lighting, origin + DVec3(1, 5, 0), origin + DVec3(2, 0, 0));
         EXPECT_NEAR(aside.x, 0.5 * std::sqrt(0.5) / kPi, 1e-3);
     }
 }
@@ -69,8 +68,8 @@ Environment environment(int width, int height, Vec3 (*radiance)(const Vec3&)) {
         for (int x = 0; x < width; ++x) {
             const double el = kPi * (0.5 - (y + 0.5) / height),
                          az = 2.0 * kPi * ((x + 0.5) / width - 0.5);
-            e.radiance.push_back(radiance(Vec3(DVec3(
-                std::sin(az) * std::cos(el), std::sin(el), -std::cos(az) * std::cos(el)))));
+            e.radiance.push_back(radiance(Vec3(
+                DVec3(std::sin(az) * std::cos(el), std::sin(el), -std::cos(az) * std::cos(el)))));
         }
     }
     prepareEnvironment(e);
@@ -93,12 +92,13 @@ TEST(CoreLight, environmentsShowTheDirectionAskedForAndTurn) {
 TEST(CoreLight, environmentsLightSurfacesAsTheIntegralSays) {
     // A bright, large lamp above on one side, and ground.
     const auto radiance = [](const Vec3& d) {
-        return d.y < 0.0f ? Vec3(0.2f, 0.1f, 0.1f)
-                          : Vec3(0.4f) + Vec3(1.0f) * std::max(0.0f, glm::dot(d, Vec3(0.8f, 0.6f, 0)));
+        return d.y < 0.0f
+                   ? Vec3(0.2f, 0.1f, 0.1f)
+                   : Vec3(0.4f) + Vec3(1.0f) * std::max(0.0f, glm::dot(d, Vec3(0.8f, 0.6f, 0)));
     };
     const Environment e = environment(128, 64, radiance);
-    for (const Vec3& n : {Vec3(0, 1, 0), Vec3(0, -1, 0), Vec3(1, 0, 0), Vec3(-1, 0, 0),
-                          Vec3(0, 0.6f, 0.8f)}) {
+    for (const Vec3& n :
+         {Vec3(0, 1, 0), Vec3(0, -1, 0), Vec3(1, 0, 0), Vec3(-1, 0, 0), Vec3(0, 0.6f, 0.8f)}) {
         DVec3 sum(0.0);
         constexpr int kDirections = 200000;
         Rng rng{7};
@@ -116,7 +116,8 @@ TEST(CoreLight, environmentsLightSurfacesAsTheIntegralSays) {
 TEST(CoreLight, environmentsOfOneValueAreThatValueEverywhere) {
     for (const auto& [w, h] : {std::pair(1, 1), std::pair(5, 3), std::pair(64, 32)}) {
         Environment e = environment(w, h, [](const Vec3&) { return Vec3(0.5f, 1.0f, 2.0f); });
-        EXPECT_LT(glm::length(environmentRadiance(e, Vec3(0.6f, 0.8f, 0)) - Vec3(0.5f, 1, 2)), 1e-5f);
+        EXPECT_LT(glm::length(environmentRadiance(e, Vec3(0.6f, 0.8f, 0)) - Vec3(0.5f, 1, 2)),
+                  1e-5f);
         EXPECT_LT(glm::length(e.horizon - Vec3(0.5f, 1, 2)), 1e-4f);
         if (w > 1)
             EXPECT_LT(glm::length(environmentAmbient(e, Vec3(0, 0, 1)) - Vec3(0.5f, 1, 2)), 0.2f);
