@@ -88,6 +88,7 @@ SceneSize sceneSize(const Scene& scene) {
         size.bytes += m.bytes();
     }
     for (const Texture& t : scene.textures) size.bytes += t.bytes();
+    if (scene.lighting.sky.environment) size.bytes += scene.lighting.sky.environment->bytes();
     for (const Group& g : scene.groups) {
         size.stored_instances += double(g.instances.size());
         size.instance_bytes += g.bytes();

@@ -211,7 +211,7 @@ bool decompose(const Affine& a, Parts& parts) {
     return true;
 }
 
-DMat3 fromEigen(const Eigen::Matrix3d& m) {
+DMat3 fromEigen(const Eigen::MatrixXd& m) {
     DMat3 result;
     for (int c = 0; c < 3; ++c) result[c] = DVec3(m(0, c), m(1, c), m(2, c));
     return result;
@@ -219,18 +219,18 @@ DMat3 fromEigen(const Eigen::Matrix3d& m) {
 
 // A sheared transform takes two nodes: rotation, scale, rotation (a singular value decomposition).
 void addShearedNode(tinygltf::Model& model, int mesh, const Affine& a) {
-    Eigen::Matrix3d m;
+    Eigen::MatrixXd m(3, 3);
     for (int c = 0; c < 3; ++c) m.col(c) << a.linear[c].x, a.linear[c].y, a.linear[c].z;
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(m, Eigen::ComputeFullU | Eigen::ComputeFullV);
     const double side_u = svd.matrixU().determinant(), side_v = svd.matrixV().determinant();
     const DMat3 u = fromEigen(svd.matrixU() * side_u), v = fromEigen(svd.matrixV() * side_v);
-    const Eigen::Vector3d s = svd.singularValues() * (side_u * side_v);
+    const Eigen::VectorXd s = svd.singularValues() * (side_u * side_v);
     tinygltf::Node inner, outer;
     inner.mesh = mesh;
     inner.rotation = numbersOf(glm::normalize(glm::quat_cast(glm::transpose(v))));
     outer.translation = numbersOf(a.translation);
     outer.rotation = numbersOf(glm::normalize(glm::quat_cast(u)));
-    outer.scale = {s.x(), s.y(), s.z()};
+    outer.scale = {s(0), s(1), s(2)};
     outer.children.push_back(addNode(model, std::move(inner), false));
     addNode(model, std::move(outer));
 }

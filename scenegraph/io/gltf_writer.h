@@ -18,8 +18,8 @@ void saveGlb(const std::string& path, const Mesh& mesh, const std::vector<Materi
 
 // Writes a whole built scene, as .glb or, by extension, as .gltf with everything in it: meshes,
 // materials, textures, cameras, and lights as KHR_lights_punctual. Nested groups are flattened; the
-// instances of a mesh stand in one node with EXT_mesh_gpu_instancing. Sky, haze and exposure have no
-// place in glTF. Throws kUnsupported above kMostExportedInstances, else as saveGlb().
+// instances of a mesh stand in one node with EXT_mesh_gpu_instancing. Sky, haze and exposure have
+// no place in glTF. Throws kUnsupported above kMostExportedInstances, else as saveGlb().
 inline constexpr double kMostExportedInstances = 1e7;
 void saveSceneGltf(const std::string& path, const Scene& scene);
 

@@ -119,8 +119,9 @@ TEST(CoreLight, environmentsOfOneValueAreThatValueEverywhere) {
         EXPECT_LT(glm::length(environmentRadiance(e, Vec3(0.6f, 0.8f, 0)) - Vec3(0.5f, 1, 2)),
                   1e-5f);
         EXPECT_LT(glm::length(e.horizon - Vec3(0.5f, 1, 2)), 1e-4f);
-        if (w > 1)
+        if (w > 1) {
             EXPECT_LT(glm::length(environmentAmbient(e, Vec3(0, 0, 1)) - Vec3(0.5f, 1, 2)), 0.2f);
+        }
     }
     Environment wide = environment(64, 2, [](const Vec3&) { return Vec3(1.0f); });
     prepareEnvironment(wide, 16);
