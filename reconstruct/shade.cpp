@@ -9,6 +9,7 @@ const float kInvPi = float(1.0 / kPi);
 
 // Irradiance / pi of the sky on a surface: between ground and sky by the normal's height.
 Vec3 skyAmbient(const Sky& sky, const Vec3& normal) {
+    if (sky.environment) return environmentAmbient(*sky.environment, normal);
     const Vec3 above = 0.5f * (sky.zenith + sky.horizon);
     return glm::mix(sky.ground, above, 0.5f + 0.5f * normal.y);
 }
@@ -16,6 +17,7 @@ Vec3 skyAmbient(const Sky& sky, const Vec3& normal) {
 }  // namespace
 
 Vec3 skyRadiance(const Sky& sky, const Vec3& direction) {
+    if (sky.environment) return environmentRadiance(*sky.environment, direction);
     if (direction.y < 0.0f) {
         // A soft horizon: ground's colour is reached 10 degrees below it.
         return glm::mix(sky.horizon, sky.ground, std::min(1.0f, -direction.y * 5.7f));
@@ -38,19 +40,30 @@ Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting
     Vec3 specular(0.0f);
     const bool has_specular =
         material.specular.x + material.specular.y + material.specular.z > 0.0f;
-    for (const Sun& sun : lighting.suns) {
-        const float cosine = glm::dot(n, sun.direction_to_light);
+    // irradiance: on a surface that faces the light.
+    const auto addLight = [&](const Vec3& direction_to_light, const Vec3& irradiance) {
+        const float cosine = glm::dot(n, direction_to_light);
         const float lit = cosine > 0.0f ? cosine * (1.0f - material.translucency)
                                         : -cosine * material.translucency;
-        diffuse += sun.irradiance * (lit * kInvPi);
+        diffuse += irradiance * (lit * kInvPi);
         if (has_specular && cosine > 0.0f) {
-            const float r = glm::dot(2.0f * cosine * n - sun.direction_to_light, to_eye);
+            const float r = glm::dot(2.0f * cosine * n - direction_to_light, to_eye);
             if (r > 0.0f) {
                 // Normalized Phong lobe, (s + 2) / (2 pi) cos^s.
                 const float lobe =
                     (material.shininess + 2.0f) * 0.5f * kInvPi * std::pow(r, material.shininess);
-                specular += sun.irradiance * (material.specular * (lobe * cosine));
+                specular += irradiance * (material.specular * (lobe * cosine));
             }
+        }
+    };
+    for (const Sun& sun : lighting.suns) addLight(sun.direction_to_light, sun.irradiance);
+    if (!lighting.points.empty()) {
+        const Vec3 from_eye = Mat3(glm::transpose(view.camera_from_world)) * sample.position_camera;
+        for (const PointLight& light : lighting.points) {
+            // Relative to the eye, so that floats do far from the origin too.
+            const Vec3 to_light = Vec3(light.position - view.eye_world) - from_eye;
+            const Vec3 irradiance = incidentLight(light, to_light);
+            if (irradiance != Vec3(0.0f)) addLight(glm::normalize(to_light), irradiance);
         }
     }
     Vec3 radiance = sample.albedo * diffuse + specular + material.emissive;

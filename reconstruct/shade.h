@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shading of one surface sample: Lambert (two-sided where the material is), translucency, Phong
-// lobe, suns and a sky. Done per sample (subpixel, point or ray) before samples are averaged into
-// pixels, the same for every method.
+// lobe, suns, point and spot lights, and a sky or an environment. Done per sample (subpixel, point
+// or ray) before samples are averaged into pixels, the same for every method.
 #pragma once
 
 #include <core/camera.h>

@@ -3,186 +3,306 @@
 
 #include <scenegraph/morton.h>
 
-#include <numeric>
-
 namespace stipple {
 
 namespace {
 
 constexpr uint32_t kLeafInstances = 20;
+constexpr size_t kChunkInstances = 16384;     // of loops over all instances
+constexpr uint32_t kTaskInstances = 1 << 15;  // subtrees up to this size are built by one thread
 
 // What a group must know of a child: a mesh or another group.
 struct ChildSums {
-    DBox3 bounds;
+    DVec3 center = DVec3(0.0), half = DVec3(-1.0);  // of its box; half < 0: empty
     double area = 0.0;
     float max_triangle_area = 0.0f;
+
+    bool isEmpty() const { return half.x < 0.0; }
 };
 
 ChildSums childSums(const Scene& scene, ChildRef child) {
     ChildSums sums;
+    DBox3 box;
     if (child.isGroup()) {
         const Group& g = scene.groups[child.index()];
-        sums = {g.bounds, g.area, g.max_triangle_area};
+        box = g.bounds;
+        sums.area = g.area, sums.max_triangle_area = g.max_triangle_area;
     } else {
         const Mesh& m = scene.meshes[child.index()];
-        if (!m.bounds.isEmpty())
-            sums.bounds.extend(DVec3(m.bounds.min)), sums.bounds.extend(DVec3(m.bounds.max));
+        if (!m.bounds.isEmpty()) box = {DVec3(m.bounds.min), DVec3(m.bounds.max)};
         sums.area = m.area;
-        for (const Stratum& s : m.strata) {
+        for (const Stratum& s : m.strata)
             sums.max_triangle_area = std::max(sums.max_triangle_area, s.max_triangle_area);
-        }
     }
+    if (!box.isEmpty()) sums.center = box.center(), sums.half = 0.5 * box.extent();
     return sums;
 }
 
-ChildSums instanceSums(const Scene& scene, const Group& group, size_t i) {
-    const Affine transform = group.instances.groupFromChild(i);
-    ChildSums sums = childSums(scene, group.instances.child(i));
-    const double scale = maxAreaScale(transform.linear);
-    sums.bounds = transformBox(transform, sums.bounds);
-    sums.area *= scale;
-    sums.max_triangle_area *= float(scale);
-    return sums;
+// The sums of the group's children, looked up once for each child where that is less work than once
+// for each instance.
+class ChildTable {
+public:
+    ChildTable(const Scene& scene, const Group& group) : scene_(scene) {
+        if (group.instances.size() < scene.meshes.size() + scene.groups.size()) return;
+        for (uint32_t i = 0; i < scene.meshes.size(); ++i)
+            meshes_.push_back(childSums(scene, ChildRef::mesh(i)));
+        for (uint32_t i = 0; i < scene.groups.size(); ++i)
+            groups_.push_back(childSums(scene, ChildRef::group(i)));
+    }
+    ChildSums operator[](ChildRef child) const {
+        if (groups_.empty()) return childSums(scene_, child);
+        return child.isGroup() ? groups_[child.index()] : meshes_[child.index()];
+    }
+
+private:
+    const Scene& scene_;
+    std::vector<ChildSums> meshes_, groups_;
+};
+
+DMat3 absolute(const DMat3& m) { return DMat3(glm::abs(m[0]), glm::abs(m[1]), glm::abs(m[2])); }
+
+// An instance's box; false if it is empty (then center is the translation).
+bool instanceBox(const ChildSums& child, const Affine& transform, DVec3& center, DVec3& half) {
+    center = transform.point(child.center);
+    half = absolute(transform.linear) * child.half;
+    return !child.isEmpty();
 }
 
-// Sort key of an instance: the first code of the cell it resides in, then the level (parents before
-// children).
+// The cell in which an instance resides: the first code of the cell, then the level (parents before
+// children). `index` makes the order total.
 struct CellKey {
     uint64_t code;
     uint32_t level;
+    uint32_t index;
     bool operator<(const CellKey& o) const {
-        return code != o.code ? code < o.code : level < o.level;
+        if (code != o.code) return code < o.code;
+        return level != o.level ? level < o.level : index < o.index;
     }
 };
 
 class GroupOctree {
 public:
-    GroupOctree(const Scene& scene, Group& group, const std::vector<CellKey>& keys)
-        : scene_(scene), group_(group), keys_(keys) {}
+    GroupOctree(const ChildTable& children, Group& group, const std::vector<CellKey>& keys)
+        : children_(children), group_(group), keys_(keys) {}
 
-    void build() {
-        group_.nodes.clear();
-        group_.nodes.push_back({});
-        fill(0, 0, uint32_t(keys_.size()), 0);
+    void build(ThreadPool& pool) {
+        std::vector<GroupNode>& nodes = group_.nodes;
+        nodes.assign(1, {});
+        // The upper levels first, without sums; what hangs below them is built in parallel.
+        std::vector<Task> tasks;
+        split(nodes, {0, 0, uint32_t(keys_.size()), 0}, &tasks);
+        const size_t n_upper = nodes.size();
+        std::vector<std::vector<GroupNode>> parts(tasks.size());
+        pool.forEach(tasks.size(), [&](size_t i, int) {
+            parts[i].push_back({});
+            split(parts[i], {0, tasks[i].begin, tasks[i].end, tasks[i].level}, nullptr);
+            for (size_t n = parts[i].size(); n-- > 0;) accumulate(parts[i], parts[i][n]);
+        });
+        size_t n_nodes = n_upper;
+        for (const std::vector<GroupNode>& part : parts) n_nodes += part.size() - 1;
+        nodes.reserve(n_nodes);
+        std::vector<bool> is_done(n_upper, false);
+        for (size_t i = 0; i < tasks.size(); ++i) {
+            // Node 0 goes to the place it was split off, the others to the end.
+            const uint32_t shift = uint32_t(nodes.size()) - 1;
+            for (GroupNode& node : parts[i]) node.first_child += shift;
+            nodes[tasks[i].node] = parts[i][0];
+            is_done[tasks[i].node] = true;
+            nodes.insert(nodes.end(), parts[i].begin() + 1, parts[i].end());
+            parts[i] = {};
+        }
+        for (size_t n = n_upper; n-- > 0;) {
+            if (!is_done[n]) accumulate(nodes, nodes[n]);
+        }
     }
 
 private:
-    // Makes nodes[index] the node over instances [begin, end), which lie in one cell of `level` or
-    // below it.
-    void fill(uint32_t index, uint32_t begin, uint32_t end, uint32_t level) {
+    // nodes[node] over instances [begin, end), which lie in one cell of `level` or below it.
+    struct Task {
+        uint32_t node, begin, end, level;
+    };
+
+    // Makes the node and all below it, but sums; children always come after their parents. tasks:
+    // where to put small subtrees instead of making them; nullptr: nowhere.
+    void split(std::vector<GroupNode>& nodes, Task task, std::vector<Task>* tasks) {
+        if (tasks && task.end - task.begin <= kTaskInstances) {
+            tasks->push_back(task);
+            return;
+        }
+        const auto [index, begin, end, level] = task;
         GroupNode node;
         node.first = begin;
         node.count = end - begin;
-        uint32_t split = begin;
+        uint32_t residents = begin;
         if (end - begin <= kLeafInstances || level == uint32_t(kMortonLevels)) {
-            split = end;
+            residents = end;
         } else {
-            while (split < end && keys_[split].level <= level) ++split;
+            while (residents < end && keys_[residents].level <= level) ++residents;
         }
-        node.resident_count = split - begin;
-        DBox3 bounds;
-        for (uint32_t i = begin; i < split; ++i) {
-            const ChildSums sums = instanceSums(scene_, group_, i);
-            bounds.extend(sums.bounds);
-            node.area += sums.area;
-            node.max_triangle_area = std::max(node.max_triangle_area, sums.max_triangle_area);
+        node.resident_count = residents - begin;
+        std::vector<uint32_t> ends;  // of the children's ranges
+        const int shift = 3 * (kMortonLevels - 1 - int(level));
+        for (uint32_t b = residents; b < end;) {
+            const uint64_t cell = keys_[b].code >> shift;
+            b = uint32_t(
+                std::partition_point(keys_.begin() + b, keys_.begin() + end,
+                                     [&](const CellKey& k) { return k.code >> shift == cell; }) -
+                keys_.begin());
+            ends.push_back(b);
         }
-        if (split < end) {
-            const int shift = 3 * (kMortonLevels - 1 - int(level));
-            std::vector<std::pair<uint32_t, uint32_t>> ranges;
-            for (uint32_t b = split; b < end;) {
-                const uint64_t cell = keys_[b].code >> shift;
-                uint32_t e = b;
-                while (e < end && keys_[e].code >> shift == cell) ++e;
-                ranges.emplace_back(b, e);
-                b = e;
-            }
-            if (ranges.size() == 1 && node.resident_count == 0)
-                return fill(index, begin, end, level + 1);
-            node.first_child = uint32_t(group_.nodes.size());
-            node.child_count = uint8_t(ranges.size());
-            group_.nodes.resize(group_.nodes.size() + ranges.size());
-            for (size_t c = 0; c < ranges.size(); ++c) {
-                fill(node.first_child + uint32_t(c), ranges[c].first, ranges[c].second, level + 1);
-                const GroupNode& child = group_.nodes[node.first_child + c];
-                if (child.count > 0 && child.area > 0.0) {
-                    bounds.extend(DVec3(child.bounds.min)), bounds.extend(DVec3(child.bounds.max));
-                }
-                node.area += child.area;
-                node.max_triangle_area = std::max(node.max_triangle_area, child.max_triangle_area);
-            }
+        if (ends.size() == 1 && node.resident_count == 0)
+            return split(nodes, {index, begin, end, level + 1}, tasks);
+        if (!ends.empty()) {
+            node.first_child = uint32_t(nodes.size());
+            node.child_count = uint8_t(ends.size());
+            nodes.resize(nodes.size() + ends.size());
         }
-        if (!bounds.isEmpty()) node.bounds = enclosingFloatBox(bounds);
-        group_.nodes[index] = node;
+        nodes[index] = node;
+        for (size_t c = 0; c < ends.size(); ++c) {
+            split(nodes,
+                  {node.first_child + uint32_t(c), c == 0 ? residents : ends[c - 1], ends[c],
+                   level + 1},
+                  tasks);
+        }
     }
 
-    const Scene& scene_;
+    // Adds up what resides in the node and its children, which have their sums.
+    void accumulate(const std::vector<GroupNode>& nodes, GroupNode& node) const {
+        DBox3 bounds;
+        for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
+            const ChildSums child = children_[group_.instances.child(i)];
+            DVec3 center, half;
+            if (instanceBox(child, group_.instances.groupFromChild(i), center, half))
+                bounds.extend(DBox3{center - half, center + half});
+            const double scale = group_.instances.areaScale(i);
+            node.area += child.area * scale;
+            node.max_triangle_area =
+                std::max(node.max_triangle_area, float(child.max_triangle_area * scale));
+        }
+        for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c) {
+            const GroupNode& child = nodes[c];
+            if (child.area > 0.0)
+                bounds.extend(DBox3{DVec3(child.bounds.min), DVec3(child.bounds.max)});
+            node.area += child.area;
+            node.max_triangle_area = std::max(node.max_triangle_area, child.max_triangle_area);
+        }
+        if (!bounds.isEmpty()) node.bounds = enclosingFloatBox(bounds);
+    }
+
+    const ChildTable& children_;
     Group& group_;
     const std::vector<CellKey>& keys_;
 };
 
+// What a pass over a chunk of instances finds.
+struct ChunkSums {
+    DBox3 bounds;
+    Box3 centers;  // of extents
+    double instances = 0.0, triangles = 0.0;
+    int depth = 1;
+    size_t bad_instance = SIZE_MAX;  // the first with a transform that cannot be
+};
+
+// Where an instance's box is and how large. Floats do: they only choose the cell it resides in.
+struct Extent {
+    Vec3 center;  // from the first instance's translation
+    float diameter;
+};
+
+ChunkSums measure(const Scene& scene, const Group& group, const ChildTable& children, size_t begin,
+                  size_t end, std::vector<Extent>& extents) {
+    ChunkSums sums;
+    const DVec3 origin = group.instances.groupFromChild(0).translation;
+    for (size_t i = begin; i < end; ++i) {
+        const Affine transform = group.instances.groupFromChild(i);
+        bool is_good = isFinite(transform);
+        if (!group.instances.isSimilarity(i)) {
+            const double length = maxLengthScale(transform.linear);
+            is_good &=
+                std::abs(glm::determinant(transform.linear)) > 1e-12 * length * length * length;
+        }
+        if (!is_good) {
+            sums.bad_instance = i;
+            return sums;
+        }
+        const ChildRef child = group.instances.child(i);
+        if (child.isGroup()) {
+            const Group& g = scene.groups[child.index()];
+            sums.instances += g.instances_total;
+            sums.triangles += g.triangles_total;
+            sums.depth = std::max(sums.depth, g.depth + 1);
+        } else {
+            sums.instances += 1.0;
+            sums.triangles += double(scene.meshes[child.index()].triangles.size());
+        }
+        DVec3 center, half;
+        const bool has_box = instanceBox(children[child], transform, center, half);
+        extents[i] = {Vec3(center - origin), has_box ? float(2.0 * glm::length(half)) : 0.0f};
+        sums.centers.extend(extents[i].center);
+        if (has_box) sums.bounds.extend(DBox3{center - half, center + half});
+    }
+    return sums;
+}
+
+CellKey cellKey(const Extent& extent, uint32_t index, const DVec3& origin, double side) {
+    // The level whose cells are about as large as the instance.
+    const int level = std::ilogb(side / std::max(double(extent.diameter), side * 1e-9));
+    CellKey key{0, uint32_t(std::clamp(level, 0, kMortonLevels)), index};
+    const int dropped = 3 * (kMortonLevels - int(key.level));
+    if (dropped < 63)
+        key.code = mortonCode(DVec3(extent.center), origin, side) >> dropped << dropped;
+    return key;
+}
+
 }  // namespace
 
-void buildGroup(Scene& scene, Group& group, const std::string& where) {
+void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool& pool) {
     const size_t n = group.instances.size();
+    const size_t n_chunks = (n + kChunkInstances - 1) / kChunkInstances;
+    const ChildTable children(scene, group);
+    std::vector<Extent> extents(n);
+    std::vector<ChunkSums> chunks(n_chunks);
+    pool.forEach(n_chunks, [&](size_t c, int) {
+        const size_t begin = c * kChunkInstances;
+        chunks[c] =
+            measure(scene, group, children, begin, std::min(n, begin + kChunkInstances), extents);
+    });
     group.bounds = DBox3();
     group.instances_total = group.triangles_total = 0.0;
     group.depth = 1;
-    std::vector<DVec3> centers(n);
-    std::vector<float> diameters(n);
-    DBox3 center_box;
-    for (size_t i = 0; i < n; ++i) {
-        const Affine transform = group.instances.groupFromChild(i);
-        const double determinant = glm::determinant(transform.linear);
-        const double length = maxLengthScale(transform.linear);
-        if (!isFinite(transform) || !(std::abs(determinant) > 1e-12 * length * length * length)) {
-            throw Error(ErrorCode::kInvalidScene, where + "/" + std::to_string(i),
-                        isFinite(transform) ? "singular transform" : "transform is not finite");
+    Box3 centers;
+    for (const ChunkSums& sums : chunks) {
+        if (sums.bad_instance != SIZE_MAX) {
+            const bool finite = isFinite(group.instances.groupFromChild(sums.bad_instance));
+            throw Error(ErrorCode::kInvalidScene, where + "/" + std::to_string(sums.bad_instance),
+                        finite ? "singular transform" : "transform is not finite");
         }
-        const ChildRef child = group.instances.child(i);
-        const DBox3 bounds = transformBox(transform, childSums(scene, child).bounds);
-        if (child.isGroup()) {
-            const Group& g = scene.groups[child.index()];
-            group.instances_total += g.instances_total;
-            group.triangles_total += g.triangles_total;
-            group.depth = std::max(group.depth, g.depth + 1);
-        } else {
-            group.instances_total += 1.0;
-            group.triangles_total += double(scene.meshes[child.index()].triangles.size());
-        }
-        centers[i] = bounds.isEmpty() ? transform.translation : bounds.center();
-        diameters[i] = bounds.isEmpty() ? 0.0f : float(glm::length(bounds.extent()));
-        center_box.extend(centers[i]);
-        group.bounds.extend(bounds);
+        group.bounds.extend(sums.bounds);
+        group.instances_total += sums.instances;
+        group.triangles_total += sums.triangles;
+        group.depth = std::max(group.depth, sums.depth);
+        centers.extend(sums.centers);
     }
     if (!group.bounds.isEmpty() && !isFinite(group.bounds.extent())) {
         throw Error(ErrorCode::kInvalidScene, where, "bounds are not finite");
     }
 
-    const DVec3 extent = n ? center_box.extent() : DVec3(1.0);
+    const DVec3 extent = n ? DVec3(centers.extent()) : DVec3(1.0);
     const double side = std::max({extent.x, extent.y, extent.z, 1e-30});
     std::vector<CellKey> keys(n);
-    for (size_t i = 0; i < n; ++i) {
-        // The level whose cells are about as large as the instance.
-        const double level =
-            std::floor(std::log2(side / std::max(double(diameters[i]), side * 1e-9)));
-        keys[i].level = uint32_t(std::clamp(level, 0.0, double(kMortonLevels)));
-        const int dropped = 3 * (kMortonLevels - int(keys[i].level));
-        const uint64_t code = mortonCode(centers[i], center_box.min, side);
-        keys[i].code = dropped >= 63 ? 0 : code >> dropped << dropped;
-    }
-    std::vector<uint32_t> order(n);
-    std::iota(order.begin(), order.end(), 0u);
-    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
-        return keys[a] < keys[b] || (!(keys[b] < keys[a]) && a < b);
+    pool.forEach(n_chunks, [&](size_t c, int) {
+        const size_t begin = c * kChunkInstances, end = std::min(n, begin + kChunkInstances);
+        for (size_t i = begin; i < end; ++i)
+            keys[i] = cellKey(extents[i], uint32_t(i), DVec3(centers.min), side);
     });
-    std::vector<CellKey> sorted(n);
-    for (size_t i = 0; i < n; ++i) sorted[i] = keys[order[i]];
-    keys = {}, centers = {}, diameters = {};
-    group.instances.permute(order);
+    extents = {};
+    parallelSort(pool, keys, std::less<CellKey>());
+    std::vector<uint32_t> order(n);
+    for (size_t i = 0; i < n; ++i) order[i] = keys[i].index;
+    group.instances.permute(order, pool);
     group.listed_index = std::move(order);
 
-    GroupOctree(scene, group, sorted).build();
+    GroupOctree(children, group, keys).build(pool);
     group.nodes.shrink_to_fit();
     group.area = group.nodes[0].area;
     group.max_triangle_area = group.nodes[0].max_triangle_area;

@@ -9,17 +9,19 @@ namespace {
 
 constexpr double kPositionSteps = 2147483647.0;  // int32 range on each side of the domain's centre
 
+constexpr size_t kChunkInstances = 65536;  // of loops over all instances
+
 // Decomposes m into scale * rotation (scale < 0: all axes mirrored). False if it is anything else.
 bool decomposeSimilarity(const DMat3& m, double& scale, glm::dquat& rotation) {
-    const double determinant = glm::determinant(m);
-    scale = std::cbrt(determinant);
-    if (!(std::abs(scale) > 1e-30)) return false;
-    const DMat3 r = m / scale;
-    const DMat3 error = r * glm::transpose(r) - DMat3(1.0);
-    for (int c = 0; c < 3; ++c) {
-        if (glm::dot(error[c], error[c]) > 1e-12) return false;
+    const double a = glm::dot(m[0], m[0]), b = glm::dot(m[1], m[1]), c = glm::dot(m[2], m[2]);
+    const double tolerance = 1e-6 * a;
+    const auto isSmall = [&](double x) { return std::abs(x) <= tolerance; };
+    if (!(a > 1e-60) || !isSmall(a - b) || !isSmall(a - c) || !isSmall(glm::dot(m[0], m[1])) ||
+        !isSmall(glm::dot(m[0], m[2])) || !isSmall(glm::dot(m[1], m[2]))) {
+        return false;
     }
-    rotation = glm::normalize(glm::quat_cast(r));
+    scale = std::copysign(std::sqrt((a + b + c) / 3.0), glm::determinant(m));
+    rotation = glm::normalize(glm::quat_cast(m * (1.0 / scale)));
     if (rotation.w < 0.0) rotation = -rotation;
     return true;
 }
@@ -30,20 +32,46 @@ InstanceStore::InstanceStore(const DBox3& domain)
     : origin_(domain.center()),
       step_(glm::max(domain.extent() * 0.5, DVec3(1e-6)) / kPositionSteps) {}
 
+bool InstanceStore::quantize(const DVec3& translation, int32_t (&position)[3]) const {
+    const DVec3 p = (translation - origin_) / step_;
+    for (int i = 0; i < 3; ++i) {
+        if (!(std::abs(p[i]) <= kPositionSteps)) return false;
+        position[i] = int32_t(std::lrint(p[i]));
+    }
+    return true;
+}
+
+void InstanceStore::addGeneral(ChildRef child, const Affine& group_from_child) {
+    records_.push_back({{int32_t(general_.size()), 0, 0}, {0, 0, 0}, 0.0f, child});
+    general_.push_back(group_from_child);
+}
+
 void InstanceStore::add(ChildRef child, const Affine& group_from_child) {
     double scale;
     glm::dquat q;
-    const DVec3 p = glm::round((group_from_child.translation - origin_) / step_);
-    const bool in_domain = std::abs(p.x) <= kPositionSteps && std::abs(p.y) <= kPositionSteps &&
-                           std::abs(p.z) <= kPositionSteps;
-    if (in_domain && decomposeSimilarity(group_from_child.linear, scale, q)) {
-        records_.push_back({{int32_t(p.x), int32_t(p.y), int32_t(p.z)},
-                            {float(q.x), float(q.y), float(q.z)},
-                            float(scale),
-                            child});
+    Record r;
+    if (quantize(group_from_child.translation, r.position) &&
+        decomposeSimilarity(group_from_child.linear, scale, q)) {
+        r.rotation[0] = float(q.x), r.rotation[1] = float(q.y), r.rotation[2] = float(q.z);
+        r.scale = float(scale);
+        r.child = child;
+        records_.push_back(r);
     } else {
-        records_.push_back({{int32_t(general_.size()), 0, 0}, {0, 0, 0}, 0.0f, child});
-        general_.push_back(group_from_child);
+        addGeneral(child, group_from_child);
+    }
+}
+
+void InstanceStore::addSimilarity(ChildRef child, const DVec3& translation,
+                                  const glm::dvec4& rotation, double scale) {
+    const glm::dvec4 q = rotation.w < 0.0 ? -rotation : rotation;
+    Record r;
+    if (quantize(translation, r.position)) {
+        r.rotation[0] = float(q.x), r.rotation[1] = float(q.y), r.rotation[2] = float(q.z);
+        r.scale = float(scale);
+        r.child = child;
+        records_.push_back(r);
+    } else {
+        addGeneral(child, {glm::mat3_cast(glm::dquat(q.w, q.x, q.y, q.z)) * scale, translation});
     }
 }
 
@@ -64,9 +92,38 @@ double InstanceStore::areaScale(size_t i) const {
     return double(r.scale) * double(r.scale);
 }
 
-void InstanceStore::permute(const std::vector<uint32_t>& order) {
+void InstanceStore::append(const InstanceStore& other) {
+    const size_t first = records_.size(), first_general = general_.size();
+    records_.insert(records_.end(), other.records_.begin(), other.records_.end());
+    if (other.general_.empty()) return;
+    general_.insert(general_.end(), other.general_.begin(), other.general_.end());
+    for (size_t i = first; i < records_.size(); ++i) {
+        if (records_[i].scale == 0.0f)
+            records_[i].position[0] = int32_t(uint32_t(records_[i].position[0]) + first_general);
+    }
+}
+
+void InstanceStore::addChunks(ThreadPool& pool, size_t n_chunks,
+                              const std::function<void(size_t, InstanceStore&)>& make) {
+    // Some chunks at a time: what they hold is there twice for a moment.
+    constexpr size_t kChunksAtATime = 32;
+    InstanceStore empty;
+    empty.origin_ = origin_, empty.step_ = step_;
+    for (size_t first = 0; first < n_chunks; first += kChunksAtATime) {
+        const size_t n = std::min(kChunksAtATime, n_chunks - first);
+        std::vector<InstanceStore> parts(n, empty);
+        pool.forEach(n, [&](size_t i, int) { make(first + i, parts[i]); });
+        for (const InstanceStore& part : parts) append(part);
+    }
+}
+
+void InstanceStore::permute(const std::vector<uint32_t>& order, ThreadPool& pool) {
     std::vector<Record> sorted(records_.size());
-    for (size_t i = 0; i < order.size(); ++i) sorted[i] = records_[order[i]];
+    pool.forEach((order.size() + kChunkInstances - 1) / kChunkInstances, [&](size_t chunk, int) {
+        const size_t begin = chunk * kChunkInstances,
+                     end = std::min(order.size(), begin + kChunkInstances);
+        for (size_t i = begin; i < end; ++i) sorted[i] = records_[order[i]];
+    });
     records_ = std::move(sorted);
 }
 

@@ -4,8 +4,10 @@
 #pragma once
 
 #include <core/math.h>
+#include <core/parallel.h>
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace stipple {
@@ -28,19 +30,33 @@ public:
     explicit InstanceStore(const DBox3& domain = DBox3{DVec3(-1), DVec3(1)});
 
     void add(ChildRef child, const Affine& group_from_child);
+    // The same for scale * rotation: scale above 0, rotation a unit quaternion x, y, z, w.
+    void addSimilarity(ChildRef child, const DVec3& translation, const glm::dvec4& rotation,
+                       double scale);
+    // Adds what make(chunk, store) puts into an empty store of the same domain, for every chunk in
+    // [0, n_chunks): in this order, whatever the threads.
+    void addChunks(ThreadPool& pool, size_t n_chunks,
+                   const std::function<void(size_t chunk, InstanceStore& store)>& make);
     void reserve(size_t n) { records_.reserve(n); }
     size_t size() const { return records_.size(); }
     ChildRef child(size_t i) const { return records_[i].child; }
     Affine groupFromChild(size_t i) const;
+    // Whether it is rotation, uniform scale (not zero) and translation.
+    bool isSimilarity(size_t i) const { return records_[i].scale != 0.0f; }
     // maxAreaScale() of groupFromChild(i).linear, without decoding the rotation.
     double areaScale(size_t i) const;
     // Reorders: new record i is old record order[i].
-    void permute(const std::vector<uint32_t>& order);
+    void permute(const std::vector<uint32_t>& order, ThreadPool& pool);
     size_t bytes() const {
         return records_.capacity() * sizeof(Record) + general_.capacity() * sizeof(Affine);
     }
 
 private:
+    void append(const InstanceStore& other);
+    void addGeneral(ChildRef child, const Affine& group_from_child);
+    // The nearest steps; false outside of the domain.
+    bool quantize(const DVec3& translation, int32_t (&position)[3]) const;
+
     // scale 0 marks an index into general_ (in position[0]).
     struct Record {
         int32_t position[3];  // translation = origin_ + step_ * position

@@ -70,7 +70,7 @@ void buildScene(Scene& scene, ThreadPool& pool) {
         buildMesh(scene.meshes[i], scene.materials, scene.path + ": " + scene.meshes[i].name);
     });
     for (uint32_t g : childrenFirst(scene)) {
-        buildGroup(scene, scene.groups[g], scene.path + ": /groups/" + scene.groups[g].name);
+        buildGroup(scene, scene.groups[g], scene.path + ": /groups/" + scene.groups[g].name, pool);
     }
 }
 
@@ -88,6 +88,7 @@ SceneSize sceneSize(const Scene& scene) {
         size.bytes += m.bytes();
     }
     for (const Texture& t : scene.textures) size.bytes += t.bytes();
+    if (scene.lighting.sky.environment) size.bytes += scene.lighting.sky.environment->bytes();
     for (const Group& g : scene.groups) {
         size.stored_instances += double(g.instances.size());
         size.instance_bytes += g.bytes();

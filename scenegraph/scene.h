@@ -42,7 +42,7 @@ struct SceneSize {
     double stored_instances = 0;  // records in groups
     double triangles_unique = 0;
     double triangles_total = 0;  // expanded
-    size_t bytes = 0;            // memory of the scene graph: meshes, textures, groups, octrees
+    size_t bytes = 0;            // memory of the scene graph: meshes, pictures, groups, octrees
     size_t instance_bytes = 0;   // of that: groups and their octrees
 };
 SceneSize sceneSize(const Scene& scene);

@@ -3,6 +3,7 @@
 // and gltf_material.cpp.
 #include <scenegraph/io/gltf.h>
 
+#include <scenegraph/io/gltf_lights.h>
 #include <scenegraph/io/gltf_mesh.h>
 #include <scenegraph/io/transform.h>
 
@@ -40,8 +41,6 @@ private:
     std::vector<Affine> gpuInstances(const tinygltf::Value& extension, const std::string& path);
     void addCamera(const tinygltf::Node& node, const Affine& world_from_node,
                    const std::string& path);
-    void addLight(const tinygltf::Value& extension, const Affine& world_from_node,
-                  const std::string& path);
 
     const GltfDocument& document_;
     Scene& scene_;
@@ -153,7 +152,8 @@ void NodeWalk::visit(int index, const Affine& world_from_node) {
         document_.context.warnOnce(document_.name,
                                    "skins are ignored: meshes stay in their bind pose");
     if (const auto it = node.extensions.find("KHR_lights_punctual"); it != node.extensions.end()) {
-        addLight(it->second, world_from_node, path);
+        addGltfLight(document_, it->second, world_from_node,
+                     path + ".extensions.KHR_lights_punctual", scene_.lighting);
     }
 }
 
@@ -269,26 +269,6 @@ void NodeWalk::addCamera(const tinygltf::Node& node, const Affine& world_from_no
     while (!camera_names_.insert(camera.name).second)
         camera.name = name + " " + std::to_string(++camera_numbers_[name] + 1);
     scene_.cameras.push_back(camera);
-}
-
-void NodeWalk::addLight(const tinygltf::Value& extension, const Affine& world_from_node,
-                        const std::string& path) {
-    const int index = extension.Get("light").GetNumberAsInt();
-    document_.checkIndex(index, document_.model.lights.size(),
-                         path + ".extensions.KHR_lights_punctual.light", "lights");
-    const tinygltf::Light& source = document_.model.lights[index];
-    if (source.type != "directional" || isSingular(world_from_node.linear)) {
-        document_.context.warnOnce(document_.name,
-                                   "lights other than directional ones are ignored");
-        return;
-    }
-    Sun sun;
-    sun.direction_to_light = Vec3(glm::normalize(world_from_node.linear[2]));  // it shines along -z
-    const Vec3 color = source.color.size() == 3
-                           ? Vec3(source.color[0], source.color[1], source.color[2])
-                           : Vec3(1.0f);
-    sun.irradiance = color * float(source.intensity);
-    scene_.lighting.suns.push_back(sun);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ Scene loadAsset(const std::string& path, LoadContext& context) {
         scene.groups.push_back(std::move(group));
     }
     scene.root = child.isGroup() ? child.index() : uint32_t(scene.groups.size() - 1);
-    if (scene.lighting.suns.empty()) {
+    if (scene.lighting.suns.empty() && scene.lighting.points.empty()) {
         Sun sun;
         sun.direction_to_light = glm::normalize(sun.direction_to_light);
         scene.lighting.suns.push_back(sun);
@@ -47,7 +47,8 @@ Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool&
             throw Error(ErrorCode::kUnsupported, oneLine(path, 300),
                         "is neither a scene file (*.scene.json) nor .gltf nor .glb");
         }
-        Scene scene = is_asset ? loadAsset(path, context) : readSceneFile(path, path, context);
+        Scene scene =
+            is_asset ? loadAsset(path, context) : readSceneFile(path, path, context, pool);
         scene.path = path;
         context.throwIfCancelled();
         buildScene(scene, pool);

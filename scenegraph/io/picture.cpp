@@ -69,4 +69,19 @@ Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budge
     return level;
 }
 
+std::string encodePng(const Texture::Level& level) {
+    const auto output = OIIO::ImageOutput::create("png");
+    std::vector<unsigned char> bytes;
+    OIIO::Filesystem::IOVecOutput memory(bytes);
+    OIIO::ImageSpec spec(level.width, level.height, 4, OIIO::TypeDesc::UINT8);
+    spec.attribute("oiio:UnassociatedAlpha", 1);
+    if (!output || !output->set_ioproxy(&memory) || !output->open("texture.png", spec) ||
+        !output->write_image(OIIO::TypeDesc::UINT8, level.rgba.data()) || !output->close()) {
+        throw Error(ErrorCode::kInternal, "",
+                    "a texture cannot be encoded as PNG: " +
+                        (output ? oneLine(output->geterror()) : "OpenImageIO has no PNG"));
+    }
+    return std::string(bytes.begin(), bytes.end());
+}
+
 }  // namespace stipple

@@ -14,4 +14,7 @@ namespace stipple {
 Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budget,
                              const std::string& where);
 
+// The picture as the bytes of a PNG file. Throws kInternal if it cannot be encoded.
+std::string encodePng(const Texture::Level& level);
+
 }  // namespace stipple

@@ -12,32 +12,12 @@ namespace stipple {
 
 namespace {
 
-// `value` with length 1. Throws for (almost) zero.
-DVec3 unitVector(const SceneReader& reader, const DVec3& value, const JsonPath& path) {
-    const double length = glm::length(value);
-    if (!(length > 1e-9)) reader.fail(path, "the vector is zero");
-    return value / length;
-}
-
 Camera readCamera(const SceneReader& reader, const Json& source, const JsonPath& path) {
-    const auto at = [&](const char* key) {
-        JsonPath p = path;
-        p.push_back(key);
-        return p;
-    };
-    DVec3 eye(0), up(0, 1, 0), target(0), direction(0);
+    DVec3 eye(0), up(0, 1, 0);
     readVector(source, "eye", eye);
     readVector(source, "up", up);
-    if (source.contains("target") == source.contains("direction"))
-        reader.fail(path, "needs either target or direction");
-    if (source.contains("target")) {
-        readVector(source, "target", target);
-        direction = unitVector(reader, target - eye, at("target"));
-    } else {
-        readVector(source, "direction", direction);
-        direction = unitVector(reader, direction, at("direction"));
-    }
-    Camera camera = lookAt(eye, eye + direction, unitVector(reader, up, at("up")));
+    const DVec3 direction = readDirection(reader, source, eye, path);
+    Camera camera = lookAt(eye, eye + direction, unitVector(reader, up, joined(path, {"up"})));
     camera.eye = eye;
     camera.name = source["name"].get<std::string>();
     if (source.contains("fov") && source.contains("orthographic"))
@@ -59,35 +39,6 @@ void readCameras(SceneReader& reader, const Json& cameras) {
         const std::string& name = reader.scene.cameras.back().name;
         if (!names.insert(name).second)
             reader.fail(path, "a camera before has the name " + inQuotes(name) + " too");
-    }
-}
-
-void readLighting(SceneReader& reader, const Json& root) {
-    Lighting& lighting = reader.scene.lighting;
-    readMember(root, "exposure", lighting.exposure);
-    if (const auto sky = root.find("background"); sky != root.end()) {
-        readVector(*sky, "zenith", lighting.sky.zenith);
-        readVector(*sky, "horizon", lighting.sky.horizon);
-        readVector(*sky, "ground", lighting.sky.ground);
-        readMember(*sky, "haze_distance", lighting.sky.haze_distance);
-    }
-    const auto lights = root.find("lights");
-    if (lights == root.end()) {
-        Sun sun;
-        sun.direction_to_light = glm::normalize(sun.direction_to_light);
-        lighting.suns.push_back(sun);
-        return;
-    }
-    if (!lights->contains("suns")) return;
-    const Json& suns = (*lights)["suns"];
-    for (size_t i = 0; i < suns.size(); ++i) {
-        Sun sun;
-        DVec3 direction(0);
-        readVector(suns[i], "direction", direction);
-        sun.direction_to_light =
-            Vec3(unitVector(reader, direction, {"lights", "suns", std::to_string(i), "direction"}));
-        readVector(suns[i], "irradiance", sun.irradiance);
-        lighting.suns.push_back(sun);
     }
 }
 
@@ -122,6 +73,114 @@ std::map<std::string, Json> takeInstances(Json& root) {
     return lists;
 }
 
+// One file: the scene's own or one that it includes.
+struct SceneDocument {
+    std::string name;              // as errors call the file
+    std::filesystem::path folder;  // of the file
+    Json root;
+    std::map<std::string, Json> instances;  // of its groups
+};
+
+constexpr size_t kMostIncludeLevels = 16;
+
+// The scene file and all that it includes, itself last; each file once.
+class DocumentLoader {
+public:
+    explicit DocumentLoader(SceneReader& reader) : reader_(reader) {}
+
+    std::vector<SceneDocument> load(const std::filesystem::path& path) {
+        read(path, reader_.name);
+        return std::move(documents_);
+    }
+
+private:
+    void read(const std::filesystem::path& path, const std::string& name) {
+        LoadContext& context = reader_.context;
+        context.throwIfCancelled();
+        SceneDocument document{name, path.parent_path(), {}, {}};
+        reader_.name = document.name, reader_.folder = document.folder;
+        {
+            const std::string text = readFile(path, context.budget, name);
+            context.budget.require(10.0 * double(text.size()), name, "the JSON document's values");
+            document.root = parseJson(text, name);
+        }
+        document.instances = takeInstances(document.root);
+        static const JsonSchema schema(kSceneSchemaText);
+        if (const auto problem = schema.firstProblem(document.root))
+            reader_.fail(problem->path, problem->message);
+        if (const auto list = document.root.find("include"); list != document.root.end()) {
+            open_.push_back(path);
+            for (size_t i = 0; i < list->size(); ++i) {
+                include(document, (*list)[i], {"include", std::to_string(i)});
+                reader_.name = document.name, reader_.folder = document.folder;
+            }
+            open_.pop_back();
+        }
+        documents_.push_back(std::move(document));
+    }
+
+    void include(const SceneDocument& from, const Json& file, const JsonPath& place) {
+        const std::filesystem::path path = reader_.file(file, place);
+        if (std::find(open_.begin(), open_.end(), path) != open_.end())
+            reader_.fail(place, inQuotes(file.get<std::string>()) + " includes itself");
+        if (open_.size() > kMostIncludeLevels) {
+            reader_.fail(place, "files that include each other more than " +
+                                    std::to_string(kMostIncludeLevels) + " levels deep");
+        }
+        if (!seen_.insert(path).second) return;
+        const std::string name =
+            (std::filesystem::path(from.name).parent_path() / file.get_ref<const std::string&>())
+                .lexically_normal()
+                .string();
+        read(path, oneLine(name, 300));
+    }
+
+    SceneReader& reader_;
+    std::vector<SceneDocument> documents_;
+    std::vector<std::filesystem::path> open_;
+    std::set<std::filesystem::path> seen_;
+};
+
+// Calls visit(document, name, value) for all members of the documents' objects `key`.
+template <class Visit>
+void forEachMember(SceneReader& reader, std::vector<SceneDocument>& documents, const char* key,
+                   const Visit& visit) {
+    for (SceneDocument& document : documents) {
+        reader.name = document.name, reader.folder = document.folder;
+        const auto members = document.root.find(key);
+        if (members == document.root.end()) continue;
+        for (const auto& [name, value] : members->items()) {
+            reader.context.throwIfCancelled();
+            visit(document, name, value);
+        }
+    }
+}
+
+void readAssetsAndGroups(SceneReader& reader, std::vector<SceneDocument>& documents) {
+    forEachMember(
+        reader, documents, "assets",
+        [&](SceneDocument&, const std::string& name, const Json& asset) {
+            if (reader.children.contains(name))
+                reader.fail({"assets", name}, "an included file has an asset of this name");
+            readAsset(reader, name, asset);
+        });
+    forEachMember(
+        reader, documents, "groups", [&](SceneDocument&, const std::string& name, const Json&) {
+            const uint32_t index = uint32_t(reader.scene.groups.size());
+            if (reader.groups.contains(name))
+                reader.fail({"groups", name}, "an included file has a group of this name");
+            if (!reader.children.emplace(name, ChildRef::group(index)).second)
+                reader.fail({"groups", name}, "an asset has this name too");
+            reader.groups[name] = index;
+            reader.scene.groups.emplace_back().name = oneLine(name);
+        });
+    forEachMember(reader, documents, "groups",
+                  [&](SceneDocument& document, const std::string& name, const Json& group) {
+                      readGroup(reader, reader.groups[name], group, document.instances[name]);
+                      document.instances.erase(name);
+                  });
+}
+
 }  // namespace
 
 ChildRef SceneReader::child(const std::string& child_name, const JsonPath& path) const {
@@ -133,45 +192,33 @@ ChildRef SceneReader::child(const std::string& child_name, const JsonPath& path)
                    (nearest.empty() ? "" : "; did you mean " + inQuotes(nearest) + "?"));
 }
 
-Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
-                    LoadContext& context) {
-    SceneReader reader{context, oneLine(name, 300), context.folder, {}, {}, {}, {}};
-    Json root;
-    {
-        const std::string text = readFile(path, context.budget, reader.name);
-        context.budget.require(10.0 * double(text.size()), reader.name,
-                               "the JSON document's values");
-        root = parseJson(text, reader.name);
-    }
-    std::map<std::string, Json> instances = takeInstances(root);
-    static const JsonSchema schema(kSceneSchemaText);
-    if (const auto problem = schema.firstProblem(root))
-        reader.fail(problem->path, problem->message);
+std::filesystem::path SceneReader::file(const Json& value, const JsonPath& path) const {
+    return resolvePath(context, folder, value.get_ref<const std::string&>(), where(path));
+}
 
-    if (const auto assets = root.find("assets"); assets != root.end()) {
-        for (const auto& [asset_name, asset] : assets->items()) {
-            context.throwIfCancelled();
-            readAsset(reader, asset_name, asset);
-        }
-    }
-    if (const auto groups = root.find("groups"); groups != root.end()) {
-        const uint32_t first = uint32_t(reader.scene.groups.size());
-        for (const auto& [group_name, unused] : groups->items()) {
-            Group group;
-            group.name = oneLine(group_name);
-            const ChildRef ref = ChildRef::group(uint32_t(reader.scene.groups.size()));
-            reader.scene.groups.push_back(std::move(group));
-            if (!reader.children.emplace(group_name, ref).second) {
-                reader.fail({"groups", group_name}, "an asset has this name too");
-            }
-        }
-        uint32_t index = first;
-        for (const auto& [group_name, group] : groups->items()) {
-            context.throwIfCancelled();
-            readGroup(reader, index++, group, instances[group_name]);
-            instances.erase(group_name);
-        }
-    }
+DVec3 readDirection(const SceneReader& reader, const Json& object, const DVec3& from,
+                    const JsonPath& path) {
+    if (object.contains("target") == object.contains("direction"))
+        reader.fail(path, "needs either target or direction");
+    const bool has_target = object.contains("target");
+    DVec3 v(0);
+    readVector(object, has_target ? "target" : "direction", v);
+    return unitVector(reader, has_target ? v - from : v,
+                      joined(path, {has_target ? "target" : "direction"}));
+}
+
+Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
+                    LoadContext& context, ThreadPool& pool) {
+    SceneReader reader{context, pool, oneLine(name, 300), context.folder, {}, {}, {}, {}, {}};
+    std::error_code error;
+    const std::filesystem::path canonical = std::filesystem::canonical(path, error);
+    std::vector<SceneDocument> documents = DocumentLoader(reader).load(error ? path : canonical);
+    readAssetsAndGroups(reader, documents);
+
+    const SceneDocument& main = documents.back();
+    reader.name = main.name, reader.folder = main.folder;
+    const Json& root = main.root;
+    if (!root.contains("root")) reader.fail({}, "Missing required property 'root'");
     const std::string& root_name = root["root"].get_ref<const std::string&>();
     const ChildRef root_child = reader.child(root_name, {"root"});
     if (!root_child.isGroup()) {

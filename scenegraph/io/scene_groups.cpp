@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <scenegraph/io/instance_buffer.h>
+#include <scenegraph/io/number_picture.h>
 #include <scenegraph/io/scene_reader.h>
 #include <scenegraph/io/schemas.h>
 #include <scenegraph/io/transform.h>
 
 #include <limits>
+#include <optional>
 
 namespace stipple {
 
@@ -83,11 +86,6 @@ const char* makeTransform(const Instance& instance, Affine& result) {
     return isSingular(result.linear) ? "singular transform: it flattens what it places" : nullptr;
 }
 
-JsonPath joined(JsonPath path, std::initializer_list<std::string> rest) {
-    path.insert(path.end(), rest);
-    return path;
-}
-
 // The box of the translations, as far as they can be read; what is wrong is found by
 // addInstances().
 DBox3 instancesDomain(const Json& instances) {
@@ -139,18 +137,68 @@ void checkOrder(const SceneReader& reader, const T& low, const T& high, const ch
     if (low > high) reader.fail(path, std::string("min_") + what + " > max_" + what);
 }
 
-ScatterParams readScatter(const SceneReader& reader, const Json& source, const HeightField*& field,
-                          const JsonPath& path) {
-    ScatterParams p;
-    if (source.contains("on")) {
-        const std::string& on = source["on"].get_ref<const std::string&>();
-        const auto it = reader.terrains.find(on);
-        if (it == reader.terrains.end()) {
-            reader.child(on, joined(path, {"on"}));  // throws if the name is not known at all
-            reader.fail(joined(path, {"on"}), inQuotes(on) + " is not a terrain asset");
+// A scatter rule with all that it refers to.
+struct ScatterRule {
+    ScatterParams params;
+    ScatterSurface surface;
+    std::optional<TriangleSurface> triangles;
+    std::optional<DensityMap> density;
+};
+
+// The triangles of an asset: a mesh, or the meshes of a file's nodes.
+TriangleSurface assetTriangles(SceneReader& reader, ChildRef asset, const JsonPath& path) {
+    std::vector<SurfacePart> parts;
+    double n_triangles = 0.0;
+    const auto addMesh = [&](ChildRef child, const Affine& group_from_mesh) {
+        const Mesh& mesh = reader.scene.meshes[child.index()];
+        parts.push_back({&mesh, group_from_mesh});
+        n_triangles += double(mesh.triangles.size());
+    };
+    if (asset.isGroup()) {
+        const InstanceStore& nodes = reader.scene.groups[asset.index()].instances;
+        for (size_t i = 0; i < nodes.size(); ++i) addMesh(nodes.child(i), nodes.groupFromChild(i));
+    } else {
+        addMesh(asset, Affine());
+    }
+    reader.context.budget.require(n_triangles * sizeof(double), reader.where(path),
+                                  "the areas of its triangles");
+    return TriangleSurface(std::move(parts));
+}
+
+DensityMap readDensityMap(SceneReader& reader, const Json& file, const JsonPath& path) {
+    const NumberPicture picture =
+        readNumberPicture(reader.file(file, path), reader.context.budget, reader.where(path));
+    DensityMap map{picture.width, picture.height, {}};
+    map.values.reserve(size_t(picture.width) * size_t(picture.height));
+    for (int y = 0; y < picture.height; ++y) {
+        for (int x = 0; x < picture.width; ++x) {
+            const float value = picture.at(x, y, 0);
+            map.values.push_back(value > 0.0f ? std::min(value, 1.0f) : 0.0f);
         }
-        field = &it->second.field;
-        p.size = it->second.size;
+    }
+    return map;
+}
+
+void readScatter(SceneReader& reader, const Json& source, const JsonPath& path, ScatterRule& rule) {
+    ScatterParams& p = rule.params;
+    if (source.contains("on")) {
+        const JsonPath on_path = joined(path, {"on"});
+        const std::string& on = source["on"].get_ref<const std::string&>();
+        const ChildRef asset = reader.child(on, on_path);
+        if (reader.groups.contains(on)) reader.fail(on_path, "is a group; scatter takes an asset");
+        if (const auto it = reader.terrains.find(on); it != reader.terrains.end()) {
+            rule.surface.field = &it->second;
+            p.size = it->second.size;
+        } else {
+            rule.triangles.emplace(assetTriangles(reader, asset, on_path));
+            rule.surface.triangles = &*rule.triangles;
+            for (const char* key : {"size", "center"}) {
+                if (source.contains(key)) {
+                    reader.fail(joined(path, {key}), std::string("has no meaning on ") +
+                                                         inQuotes(on) + ", which is no terrain");
+                }
+            }
+        }
     }
     for (size_t i = 0; i < source["items"].size(); ++i) {
         const Json& item = source["items"][i];
@@ -160,8 +208,11 @@ ScatterParams readScatter(const SceneReader& reader, const Json& source, const H
         readMember(item, "weight", result.weight);
         p.items.push_back(result);
     }
+    readMember(source, "spacing", p.spacing);
+    constexpr uint64_t kMostSpaced = uint64_t(1) << 27;
+    if (p.spacing > 0.0) p.count = kMostSpaced;  // as many as find room
     readMember(source, "count", p.count);
-    readMember(source, "size", p.size);
+    if (source.contains("size")) p.size = DVec2(source["size"].get<double>());
     readVector(source, "center", p.center);
     readDegrees(source, "min_slope", p.min_slope);
     readDegrees(source, "max_slope", p.max_slope);
@@ -177,7 +228,15 @@ ScatterParams readScatter(const SceneReader& reader, const Json& source, const H
     checkOrder(reader, p.min_slope, p.max_slope, "slope", path);
     checkOrder(reader, p.min_height, p.max_height, "height", path);
     checkOrder(reader, p.min_scale, p.max_scale, "scale", path);
-    return p;
+    if (const auto file = source.find("density_map"); file != source.end()) {
+        rule.density.emplace(readDensityMap(reader, *file, joined(path, {"density_map"})));
+        p.density = &*rule.density;
+    }
+    constexpr double kBytesPerTry = 160.0;  // a place, twice while they are joined
+    if (p.spacing > 0.0) {
+        reader.context.budget.require(kBytesPerTry * scatterTries(p, rule.surface),
+                                      reader.where(path), "places that keep their distance");
+    }
 }
 
 GridParams readGrid(const SceneReader& reader, const Json& source, const JsonPath& path) {
@@ -204,13 +263,9 @@ GridParams readGrid(const SceneReader& reader, const Json& source, const JsonPat
 void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Json& instances) {
     const std::string& name = reader.scene.groups[index].name;
     const JsonPath path = {"groups", name};
-    const HeightField* field = nullptr;
-    ScatterParams scattered;
-    GridParams grid;
     DBox3 domain = instancesDomain(instances);
     double total = double(instances.size());
-    const auto count = [&](double n, const char* key) {
-        const JsonPath place = joined(path, {key});
+    const auto count = [&](double n, const JsonPath& place) {
         reader.context.budget.take(n * kBytesPerInstance, reader.where(place),
                                    std::to_string(uint64_t(n)) + " instances");
         total += n;
@@ -221,28 +276,41 @@ void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Jso
     };
     reader.context.budget.take(total * kBytesPerInstance, reader.where(path),
                                std::to_string(instances.size()) + " instances");
-    if (group.contains("scatter")) {
-        scattered = readScatter(reader, group["scatter"], field, joined(path, {"scatter"}));
-        count(double(scattered.count), "scatter");
-        domain.extend(withPlace(reader, joined(path, {"scatter"}),
-                                [&] { return scatterDomain(scattered, field); }));
+    const JsonPath buffer_path = joined(path, {"buffer"}), scatter_path = joined(path, {"scatter"}),
+                   grid_path = joined(path, {"grid"});
+    std::optional<InstanceBuffer> buffer;
+    if (group.contains("buffer")) {
+        buffer.emplace(reader, group["buffer"], buffer_path);
+        count(double(buffer->size()), buffer_path);
+        domain.extend(buffer->domain());
     }
+    std::optional<ScatterRule> rule;
+    if (group.contains("scatter")) {
+        rule.emplace();
+        readScatter(reader, group["scatter"], scatter_path, *rule);
+        count(scatterMost(rule->params, rule->surface), scatter_path);
+        domain.extend(withPlace(reader, scatter_path,
+                                [&] { return scatterDomain(rule->params, rule->surface); }));
+    }
+    std::optional<GridParams> grid;
     if (group.contains("grid")) {
-        grid = readGrid(reader, group["grid"], joined(path, {"grid"}));
-        count(double(grid.count_x) * double(grid.count_z), "grid");
-        domain.extend(withPlace(reader, joined(path, {"grid"}), [&] { return gridDomain(grid); }));
+        grid = readGrid(reader, group["grid"], grid_path);
+        count(double(grid->count_x) * double(grid->count_z), grid_path);
+        domain.extend(withPlace(reader, grid_path, [&] { return gridDomain(*grid); }));
     }
     if (domain.isEmpty()) domain = DBox3{DVec3(-1), DVec3(1)};
 
     InstanceStore store(domain);
-    store.reserve(size_t(total));
+    if (!rule || rule->params.spacing == 0.0) store.reserve(size_t(total));
     addInstances(reader, instances, store, path);
-    if (group.contains("scatter")) {
-        withPlace(reader, joined(path, {"scatter"}), [&] { scatter(scattered, field, store); });
+    if (buffer) buffer->addTo(store);
+    reader.context.throwIfCancelled();
+    if (rule) {
+        withPlace(reader, scatter_path,
+                  [&] { scatter(rule->params, rule->surface, reader.pool, store); });
     }
     reader.context.throwIfCancelled();
-    if (group.contains("grid"))
-        withPlace(reader, joined(path, {"grid"}), [&] { placeGrid(grid, store); });
+    if (grid) withPlace(reader, grid_path, [&] { placeGrid(*grid, reader.pool, store); });
     reader.scene.groups[index].instances = std::move(store);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of reading a scene file: assets (scene_assets.cpp), groups (scene_groups.cpp), the rest
-// (scene_file.cpp). Internal.
+// The parts of reading a scene file: assets (scene_assets.cpp), groups (scene_groups.cpp), lights
+// (scene_lights.cpp), the rest (scene_file.cpp). Internal.
 #pragma once
 
 #include <scenegraph/io/json.h>
@@ -12,19 +12,16 @@
 
 namespace stipple {
 
-// A terrain asset's heights, kept while groups scatter over it.
-struct Terrain {
-    HeightField field;
-    double size = 0.0;
-};
-
 struct SceneReader {
     LoadContext& context;
-    std::string name;              // as errors call the file
-    std::filesystem::path folder;  // of the file
+    ThreadPool& pool;
+    std::string name;              // as errors call the file that is being read
+    std::filesystem::path folder;  // of that file
     Scene scene;
     std::map<std::string, ChildRef> children;  // assets and groups by name
-    std::map<std::string, Terrain> terrains;
+    std::map<std::string, uint32_t> groups;    // the groups of the file: indices into scene.groups
+    std::map<std::string, HeightField>
+        terrains;                           // of terrain assets, while groups scatter over them
     std::map<std::string, ChildRef> files;  // assets by path: each file is loaded once
 
     std::string where(const JsonPath& path) const { return name + ": " + jsonPointer(path); }
@@ -33,6 +30,8 @@ struct SceneReader {
     }
     // The asset or group of that name. Throws naming the nearest one.
     ChildRef child(const std::string& child_name, const JsonPath& path) const;
+    // The file that the string at `path` names. Throws as resolvePath().
+    std::filesystem::path file(const Json& value, const JsonPath& path) const;
 };
 
 // Adds the asset's meshes, materials and textures, and its name.
@@ -41,6 +40,15 @@ void readAsset(SceneReader& reader, const std::string& name, const Json& asset);
 // Adds the instances of groups[index], whose name is in reader.children already. instances: the
 // group's explicit ones, which have been taken out of `group` and are not yet validated.
 void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Json& instances);
+
+// Fills the scene's lighting from the document's lights, background and exposure.
+void readLighting(SceneReader& reader, const Json& root);
+
+// `path` with further steps.
+inline JsonPath joined(JsonPath path, std::initializer_list<std::string> rest) {
+    path.insert(path.end(), rest);
+    return path;
+}
 
 // Calls make(), giving errors about its parameters (kInvalidArgument) a place in the file.
 template <class Make>
@@ -64,8 +72,19 @@ void readVector(const Json& object, const char* key, V& value) {
     if (it == object.end()) return;
     for (int i = 0; i < V::length(); ++i) value[i] = (*it)[i].get<typename V::value_type>();
 }
-inline void readDegrees(const Json& object, const char* key, double& value) {
-    if (const auto it = object.find(key); it != object.end()) value = radians(it->get<double>());
+template <class T>
+void readDegrees(const Json& object, const char* key, T& value) {
+    if (const auto it = object.find(key); it != object.end()) value = T(radians(it->get<double>()));
 }
+
+// `value` with length 1. Throws for (almost) zero.
+inline DVec3 unitVector(const SceneReader& reader, const DVec3& value, const JsonPath& path) {
+    const double length = glm::length(value);
+    if (!(length > 1e-9)) reader.fail(path, "the vector is zero");
+    return value / length;
+}
+// The direction from `from` that the object at `path` gives by "target" or "direction": unit.
+DVec3 readDirection(const SceneReader& reader, const Json& object, const DVec3& from,
+                    const JsonPath& path);
 
 }  // namespace stipple

@@ -45,11 +45,12 @@ struct RockParams {
 };
 GeneratedMesh makeRock(const RockParams& params);
 
-// Heights on a square grid centred on the origin, flat triangles between.
+// Heights on a grid centred on the origin, flat triangles between.
 struct HeightField {
-    int resolution = 0;          // samples along a side
-    double size = 0.0;           // metres along a side
-    std::vector<float> heights;  // resolution^2, metres, row = z, column = x
+    int columns = 0;             // samples along x, at least 2
+    int rows = 0;                // samples along z, at least 2
+    DVec2 size = DVec2(0.0);     // metres along x and z
+    std::vector<float> heights;  // rows * columns, metres, row = z, column = x
 
     double height(double x, double z) const;  // clamped to the border outside
     Vec3 normal(double x, double z) const;    // unit
@@ -65,7 +66,11 @@ struct TerrainParams {
         "meadow";  // meadow (green, rock where steep), forest_floor, mountain (rock, snow on top)
 };
 HeightField makeHeightField(const TerrainParams& params);
-// The height field as a mesh with smooth normals, coloured by height and slope.
+// The height field as a mesh with smooth normals and texture coordinates that span it, u along x
+// and v along z.
+Mesh heightFieldMesh(const HeightField& field);
+// The same without texture coordinates, coloured by height and slope; of `params` only style and
+// seed count.
 GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field);
 
 // A simple body for test scenes: "sphere" (diameter 1), "box" (side 1), "plane" (side 1, facing

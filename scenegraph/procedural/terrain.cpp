@@ -115,30 +115,53 @@ DVec3 groundColor(TerrainStyle style, uint64_t key, const DVec2& p, double relat
     return color * (1.0 - 0.25 * std::clamp(hollow, -0.4, 1.0));
 }
 
+// A height field by samples; beyond the border the border's.
+struct FieldSampler {
+    const HeightField& field;
+
+    DVec2 step() const { return field.size / DVec2(field.columns - 1, field.rows - 1); }
+    double height(int i, int j) const {
+        const size_t row = size_t(std::clamp(j, 0, field.rows - 1)),
+                     column = size_t(std::clamp(i, 0, field.columns - 1));
+        return double(field.heights[row * size_t(field.columns) + column]);
+    }
+    DVec3 position(int i, int j) const {
+        return DVec3(-0.5 * field.size.x + i * step().x, height(i, j),
+                     -0.5 * field.size.y + j * step().y);
+    }
+    DVec3 normal(int i, int j) const {
+        const int n_x = std::min(i + 1, field.columns - 1) - std::max(i - 1, 0),
+                  n_z = std::min(j + 1, field.rows - 1) - std::max(j - 1, 0);
+        const double dx = (height(i + 1, j) - height(i - 1, j)) / (step().x * n_x),
+                     dz = (height(i, j + 1) - height(i, j - 1)) / (step().y * n_z);
+        return glm::normalize(DVec3(-dx, 1.0, -dz));
+    }
+};
+
 }  // namespace
 
 double HeightField::height(double x, double z) const {
-    const double last = double(resolution - 1);
-    const double u = std::clamp((x / size + 0.5) * last, 0.0, last),
-                 v = std::clamp((z / size + 0.5) * last, 0.0, last);
-    const int i = std::min(int(u), resolution - 2), j = std::min(int(v), resolution - 2);
+    const double last_x = double(columns - 1), last_z = double(rows - 1);
+    const double u = std::clamp((x / size.x + 0.5) * last_x, 0.0, last_x),
+                 v = std::clamp((z / size.y + 0.5) * last_z, 0.0, last_z);
+    const int i = std::min(int(u), columns - 2), j = std::min(int(v), rows - 2);
     const double fu = u - i, fv = v - j;
-    // The corners of the cell and its diagonal b-c, as makeTerrain() splits it: what is placed on
-    // the field stands on the mesh.
-    const float* row = heights.data() + size_t(j) * size_t(resolution) + size_t(i);
-    const double a = row[0], b = row[1], c = row[resolution], d = row[resolution + 1];
+    // The corners of the cell and its diagonal b-c, as heightFieldMesh() splits it: what is placed
+    // on the field stands on the mesh.
+    const float* row = heights.data() + size_t(j) * size_t(columns) + size_t(i);
+    const double a = row[0], b = row[1], c = row[columns], d = row[columns + 1];
     if (fu + fv < 1.0) return a + fu * (b - a) + fv * (c - a);
     return d + (1.0 - fu) * (c - d) + (1.0 - fv) * (b - d);
 }
 
 Vec3 HeightField::normal(double x, double z) const {
-    const double step = size / double(resolution - 1);
-    const double half = 0.5 * size;
+    const DVec2 step = size / DVec2(double(columns - 1), double(rows - 1));
+    const DVec2 half = 0.5 * size;
     // Differences over what lies within the border.
-    const double x0 = std::clamp(x - step, -half, half - step),
-                 x1 = std::clamp(x + step, -half + step, half);
-    const double z0 = std::clamp(z - step, -half, half - step),
-                 z1 = std::clamp(z + step, -half + step, half);
+    const double x0 = std::clamp(x - step.x, -half.x, half.x - step.x),
+                 x1 = std::clamp(x + step.x, -half.x + step.x, half.x);
+    const double z0 = std::clamp(z - step.y, -half.y, half.y - step.y),
+                 z1 = std::clamp(z + step.y, -half.y + step.y, half.y);
     const double dx = (height(x1, z) - height(x0, z)) / (x1 - x0),
                  dz = (height(x, z1) - height(x, z0)) / (z1 - z0);
     return Vec3(glm::normalize(DVec3(-dx, 1.0, -dz)));
@@ -148,8 +171,8 @@ HeightField makeHeightField(const TerrainParams& params) {
     check(params);
     const TerrainStyle style = terrainStyle(params.style);
     HeightField field;
-    field.resolution = params.resolution;
-    field.size = params.size;
+    field.columns = field.rows = params.resolution;
+    field.size = DVec2(params.size);
     const size_t n = size_t(params.resolution);
     field.heights.resize(n * n);
     const double step = params.size / double(n - 1);
@@ -172,56 +195,61 @@ HeightField makeHeightField(const TerrainParams& params) {
     return field;
 }
 
-GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field) {
-    check(params);
-    const TerrainStyle style = terrainStyle(params.style);
-    const uint64_t key = hashCombine(params.seed, 0x7e45);
-    GeneratedMesh result;
-    Mesh& mesh = result.mesh;
+Mesh heightFieldMesh(const HeightField& field) {
+    const FieldSampler sample{field};
+    const int n_x = field.columns, n_z = field.rows;
+    const size_t count = size_t(n_x) * size_t(n_z);
+    Mesh mesh;
     mesh.name = "terrain";
-    const int n = field.resolution;
-    const size_t count = size_t(n) * size_t(n);
     mesh.positions.reserve(count);
     mesh.normals.reserve(count);
-    mesh.colors.reserve(count);
-    float low = kInfinity, high = -kInfinity;
-    for (const float h : field.heights) low = std::min(low, h), high = std::max(high, h);
-    const double step = field.size / double(n - 1);
-    const int reach = std::max(1, int(6.0 / step));  // samples: hollows are judged over some metres
-    const auto sample = [&](int i, int j) {
-        return double(field.heights[size_t(std::clamp(j, 0, n - 1)) * size_t(n) +
-                                    size_t(std::clamp(i, 0, n - 1))]);
-    };
-    for (int j = 0; j < n; ++j) {
-        for (int i = 0; i < n; ++i) {
-            const double x = -0.5 * field.size + i * step, z = -0.5 * field.size + j * step,
-                         y = sample(i, j);
-            const double dx = (sample(i + 1, j) - sample(i - 1, j)) /
-                              (step * (std::min(i + 1, n - 1) - std::max(i - 1, 0)));
-            const double dz = (sample(i, j + 1) - sample(i, j - 1)) /
-                              (step * (std::min(j + 1, n - 1) - std::max(j - 1, 0)));
-            const DVec3 normal = glm::normalize(DVec3(-dx, 1.0, -dz));
-            const double around = 0.25 * (sample(i - reach, j) + sample(i + reach, j) +
-                                          sample(i, j - reach) + sample(i, j + reach));
-            const double hollow = 4.0 * (around - y) / (reach * step);
-            const double relative_height = high > low ? (y - low) / (high - low) : 0.0;
-            const DVec3 color = groundColor(style, key, DVec2(x, z), relative_height,
-                                            std::acos(std::min(normal.y, 1.0)), hollow);
-            mesh.positions.push_back(Vec3(DVec3(x, y, z)));
-            mesh.normals.push_back(Vec3(normal));
-            mesh.colors.push_back(Vec4(Vec3(glm::clamp(color, DVec3(0.0), DVec3(1.0))), 1.0f));
+    mesh.uvs.reserve(count);
+    for (int j = 0; j < n_z; ++j) {
+        for (int i = 0; i < n_x; ++i) {
+            mesh.positions.push_back(Vec3(sample.position(i, j)));
+            mesh.normals.push_back(Vec3(sample.normal(i, j)));
+            mesh.uvs.push_back(Vec2(double(i) / (n_x - 1), double(j) / (n_z - 1)));
         }
     }
-    mesh.triangles.reserve(2 * size_t(n - 1) * size_t(n - 1));
-    for (int j = 0; j + 1 < n; ++j) {
-        for (int i = 0; i + 1 < n; ++i) {
-            const uint32_t a = uint32_t(j) * uint32_t(n) + uint32_t(i), b = a + 1,
-                           c = a + uint32_t(n), d = c + 1;
+    mesh.triangles.reserve(2 * size_t(n_x - 1) * size_t(n_z - 1));
+    for (int j = 0; j + 1 < n_z; ++j) {
+        for (int i = 0; i + 1 < n_x; ++i) {
+            const uint32_t a = uint32_t(j) * uint32_t(n_x) + uint32_t(i), b = a + 1,
+                           c = a + uint32_t(n_x), d = c + 1;
             mesh.triangles.push_back(UVec3(a, c, b));
             mesh.triangles.push_back(UVec3(b, c, d));
         }
     }
     mesh.triangle_material.assign(mesh.triangles.size(), 0);
+    return mesh;
+}
+
+GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field) {
+    const TerrainStyle style = terrainStyle(params.style);
+    const uint64_t key = hashCombine(params.seed, 0x7e45);
+    GeneratedMesh result;
+    Mesh& mesh = result.mesh;
+    mesh = heightFieldMesh(field);
+    mesh.uvs = {};
+    mesh.colors.reserve(mesh.positions.size());
+    const FieldSampler sample{field};
+    const auto [least, most] = std::minmax_element(field.heights.begin(), field.heights.end());
+    const double low = *least, relief = double(*most) - low;
+    const double step = std::min(sample.step().x, sample.step().y);
+    const int reach = std::max(1, int(6.0 / step));  // samples: hollows are judged over some metres
+    for (int j = 0; j < field.rows; ++j) {
+        for (int i = 0; i < field.columns; ++i) {
+            const DVec3 p = sample.position(i, j), normal = sample.normal(i, j);
+            const double around =
+                0.25 * (sample.height(i - reach, j) + sample.height(i + reach, j) +
+                        sample.height(i, j - reach) + sample.height(i, j + reach));
+            const double hollow = 4.0 * (around - p.y) / (reach * step);
+            const double relative_height = relief > 0.0 ? (p.y - low) / relief : 0.0;
+            const DVec3 color = groundColor(style, key, DVec2(p.x, p.z), relative_height,
+                                            std::acos(std::min(normal.y, 1.0)), hollow);
+            mesh.colors.push_back(Vec4(Vec3(glm::clamp(color, DVec3(0.0), DVec3(1.0))), 1.0f));
+        }
+    }
     Material material;
     material.name = "ground";
     material.base_color = Vec3(1.0f);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // `stipple info`: what is in a scene, as text or as JSON.
+#include <scenegraph/io/gltf_writer.h>
 #include <scenegraph/io/load.h>
 #include <tools/command_line.h>
 #include <tools/commands.h>
 #include <tools/json_number.h>
+#include <tools/output_file.h>
 #include <tools/signals.h>
 
 #include <cstdio>
@@ -15,11 +17,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const HelpText kHelp = {"stipple info SCENE [--json]",
+const HelpText kHelp = {"stipple info SCENE [--json] [--export FILE]",
                         "Prints what is in a scene: instances, unique and expanded triangles, "
                         "memory, groups with their "
                         "depth, cameras and materials.",
-                        {"stipple info scenes/forest.scene.json", "stipple info tree.glb --json"}};
+                        {"stipple info scenes/forest.scene.json", "stipple info tree.glb --json",
+                         "stipple info wood.scene.json --export wood.glb"}};
 
 Json boxJson(const DBox3& box) {
     if (box.isEmpty()) return nullptr;
@@ -126,8 +129,13 @@ ExitCode runInfo(const std::vector<std::string>& arguments) {
     std::string path;
     LoadOptions load_options;
     bool as_json = false;
+    std::string export_path;
     app.add_option("SCENE", path, "*.scene.json, .gltf or .glb")->required()->group("Arguments");
     app.add_flag("--json", as_json, "print JSON");
+    app.add_option("--export", export_path,
+                   "write the scene as glTF too (.glb or .gltf): groups flattened, up to 10^7 "
+                   "instances")
+        ->type_name("FILE");
     app.add_flag("--allow-outside", load_options.allow_outside,
                  "let the scene's paths leave its folder");
     app.add_option("--memory-limit", load_options.memory_limit_mb,
@@ -135,6 +143,7 @@ ExitCode runInfo(const std::vector<std::string>& arguments) {
         ->type_name("MB");
     if (!parseArguments(app, kHelp, arguments)) return ExitCode::kDone;
 
+    if (!export_path.empty()) checkOutputFile("--export", export_path, {".glb", ".gltf"});
     const CancelFlag& cancel = cancelOnSignals();
     load_options.cancel = &cancel;
     Diagnostics diagnostics;
@@ -142,6 +151,7 @@ ExitCode runInfo(const std::vector<std::string>& arguments) {
     const Scene scene = loadScene(path, load_options, pool, diagnostics);
     throwIfCancelled(cancel);
     for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
+    if (!export_path.empty()) saveSceneGltf(export_path, scene);
     const Json info = infoJson(scene, diagnostics.warnings);
     if (as_json) {
         std::cout << info.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";

@@ -334,6 +334,21 @@ case_info() {
     [[ ! -s stderr.txt ]] || fail "something on stderr"
 }
 
+case_export() {
+    write_scene
+    for file in a.glb a.gltf; do
+        expect_ok info scene.scene.json --json --export $file
+        local total
+        total=$(grep '"triangles_total"' stdout.txt)
+        expect_ok info $file --json
+        expect_stdout "$total"
+    done
+    expect_error 2 '\.glb' info scene.scene.json --export a.obj
+    "$stipple" generate landscape --count 100000000 -o big.scene.json >/dev/null || fail "cannot generate"
+    expect_error 3 '^stipple: b\.glb: .*instances' info big.scene.json --export b.glb
+    expect_no_file 'b.glb*'
+}
+
 case_compare() {
     write_scene
     expect_ok render scene.scene.json -o a.png "${tiny[@]}" --seed 1

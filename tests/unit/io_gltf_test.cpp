@@ -444,6 +444,43 @@ TEST(IoGltf, addsCamerasAndDirectionalLights) {
     EXPECT_NEAR(loaded.scene.lighting.suns[0].irradiance.g, 1.0f, 1e-6f);
 }
 
+TEST(IoGltf, readsPointAndSpotLightsWhereTheirNodesStand) {
+    GltfBuilder b = GltfBuilder::triangle();
+    b.json["extensions"]["KHR_lights_punctual"]["lights"] = {
+        {{"type", "point"}, {"color", {1, 0.5, 0}}, {"intensity", 40}, {"range", 9}},
+        {{"type", "spot"}, {"spot", {{"innerConeAngle", 0.2}, {"outerConeAngle", 0.5}}}}};
+    const auto lightNode = [](int light) {
+        return Json{{"extensions", {{"KHR_lights_punctual", {{"light", light}}}}}};
+    };
+    b.json["nodes"].push_back(lightNode(0));
+    b.json["nodes"].push_back(lightNode(1));
+    b.json["nodes"][2]["translation"] = {0, 1, 0};
+    // The lights hang below a node that turns x to -z, moves and scales.
+    const double h = std::sqrt(0.5);
+    b.json["nodes"].push_back({{"children", {1, 2}},
+                               {"translation", {5, 0, 0}},
+                               {"rotation", {0, h, 0, h}},
+                               {"scale", {2, 2, 2}}});
+    b.json["scenes"][0]["nodes"].push_back(3);
+    const Loaded loaded = load(b);
+    ASSERT_EQ(loaded.error, "");
+    const std::vector<PointLight>& points = loaded.scene.lighting.points;
+    ASSERT_EQ(points.size(), 2u);
+    EXPECT_TRUE(loaded.scene.lighting.suns.empty());
+    EXPECT_LT(glm::length(points[0].position - DVec3(5, 0, 0)), 1e-9);
+    EXPECT_EQ(points[0].intensity, Vec3(40, 20, 0));
+    EXPECT_EQ(points[0].range, 9.0f);
+    EXPECT_FALSE(points[0].is_spot);
+    EXPECT_TRUE(points[1].is_spot);
+    EXPECT_LT(glm::length(points[1].position - DVec3(5, 2, 0)), 1e-9);
+    EXPECT_LT(glm::length(points[1].axis - Vec3(-1, 0, 0)), 1e-6f);
+    EXPECT_EQ(points[1].inner_cone, 0.2f);
+    EXPECT_EQ(points[1].intensity, Vec3(1.0f));
+    b.json["extensions"]["KHR_lights_punctual"]["lights"][1]["spot"]["innerConeAngle"] = 0.6;
+    EXPECT_NE(tryLoadText("t.gltf", b.gltf()).error.find("lights[1].spot: the cone's angles"),
+              std::string::npos);
+}
+
 TEST(IoGltf, warnsOnceOfExtensionsItDoesNotKnow) {
     GltfBuilder b = GltfBuilder::triangle();
     b.json["extensionsUsed"] = {"KHR_materials_clearcoat", "KHR_mesh_quantization"};

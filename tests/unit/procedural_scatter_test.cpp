@@ -11,15 +11,21 @@
 namespace stipple {
 namespace {
 
+ThreadPool& twoThreads() {  // started once: some tests scatter a thousand times
+    static ThreadPool pool(2);
+    return pool;
+}
+
 InstanceStore scattered(const ScatterParams& params, const HeightField* field = nullptr) {
-    InstanceStore store(scatterDomain(params, field));
-    scatter(params, field, store);
+    const ScatterSurface surface{field, nullptr};
+    InstanceStore store(scatterDomain(params, surface));
+    scatter(params, surface, twoThreads(), store);
     return store;
 }
 
 InstanceStore placed(const GridParams& params) {
     InstanceStore store(gridDomain(params));
-    placeGrid(params, store);
+    placeGrid(params, twoThreads(), store);
     return store;
 }
 
@@ -55,8 +61,8 @@ ScatterParams oneKind(uint64_t count) {
 // A ramp along x: slope 45 degrees for x > 0, flat for x < 0.
 HeightField ramp() {
     HeightField field;
-    field.resolution = 101;
-    field.size = 100.0;
+    field.columns = field.rows = 101;
+    field.size = DVec2(100.0);
     for (int j = 0; j < 101; ++j) {
         for (int i = 0; i < 101; ++i) field.heights.push_back(float(std::max(0, i - 50)));
     }
@@ -80,7 +86,7 @@ TEST(ProceduralScatter, placesAboutTheWantedNumber) {
 
 TEST(ProceduralScatter, clusteringKeepsTheMeanOverManyThickets) {
     ScatterParams params = oneKind(200000);
-    params.size = 6000.0;  // 10^4 thickets
+    params.size = DVec2(6000.0);  // 10^4 thickets
     params.clustering = 1.0;
     const InstanceStore store = scattered(params);
     EXPECT_NEAR(double(store.size()), 200000.0, 0.04 * 200000.0);
@@ -99,7 +105,7 @@ TEST(ProceduralScatter, clusteringKeepsTheMeanOverManyThickets) {
 
 TEST(ProceduralScatter, isUniformOverTheSquare) {
     ScatterParams params = oneKind(100000);
-    params.size = 64.0;
+    params.size = DVec2(64.0);
     params.center = DVec2(10.0, -20.0);
     const InstanceStore store = scattered(params);
     constexpr int kSide = 16;
@@ -215,18 +221,94 @@ TEST(ProceduralScatter, staysWithinItsDomain) {
     EXPECT_LE(placed(grid).bytes(), 2500u * 32u);
 }
 
+TEST(ProceduralScatter, keepsTheSpacingAndFillsTheSquare) {
+    ScatterParams params = oneKind(uint64_t(1) << 27);
+    params.size = DVec2(60.0, 30.0);
+    params.spacing = 2.0;
+    const InstanceStore store = scattered(params);
+    // Between half and all of the densest packing there is (2 / sqrt(3) a squared spacing).
+    EXPECT_GT(store.size(), 60u * 30u / 4u / 2u);
+    EXPECT_LT(store.size(), size_t(1.16 * 60 * 30 / 4));
+    double nearest = 1e9;
+    for (size_t i = 0; i < store.size(); ++i) {
+        for (size_t j = 0; j < i; ++j) {
+            nearest = std::min(nearest, glm::length(store.groupFromChild(i).translation -
+                                                    store.groupFromChild(j).translation));
+        }
+    }
+    EXPECT_GE(nearest, 2.0 - 1e-6);
+    EXPECT_LT(nearest, 2.1);
+    params.count = 20;
+    EXPECT_EQ(scattered(params).size(), 20u);
+}
+
+TEST(ProceduralScatter, standsOnTrianglesEvenlyAndAlongTheirNormals) {
+    // A sphere of diameter 20 about (5, 0, 0), from a mesh of diameter 1.
+    const GeneratedMesh ball = makePrimitive("sphere", 20000, Vec3(1.0f));
+    const TriangleSurface triangles({{&ball.mesh, {DMat3(20.0), DVec3(5, 0, 0)}}});
+    EXPECT_NEAR(triangles.area(), 400.0 * kPi, 5.0);
+    const ScatterSurface surface{nullptr, &triangles};
+    ScatterParams params = oneKind(20000);
+    params.align = 1.0;
+    params.max_slope = kPi;
+    params.sink = 1.0;
+    ThreadPool one(1), three(3);
+    InstanceStore store(scatterDomain(params, surface)), again(scatterDomain(params, surface));
+    scatter(params, surface, one, store);
+    scatter(params, surface, three, again);
+    EXPECT_EQ(hashStore(store), hashStore(again));
+    EXPECT_EQ(store.size(), 20000u);
+    int upper = 0;
+    for (size_t i = 0; i < store.size(); ++i) {
+        const Affine a = store.groupFromChild(i);
+        const DVec3 from_center = a.translation - DVec3(5, 0, 0);
+        ASSERT_NEAR(glm::length(from_center), 9.0, 0.02);
+        ASSERT_GT(glm::dot(glm::normalize(a.linear[1]), glm::normalize(from_center)), 0.999);
+        ASSERT_GT(glm::determinant(a.linear), 0.0);
+        upper += from_center.y > 4.5;  // a quarter of the sphere's area, by Archimedes
+    }
+    EXPECT_NEAR(upper, 5000, 250);
+    params.max_slope = radians(60.0);
+    InstanceStore top(scatterDomain(params, surface));
+    scatter(params, surface, one, top);
+    EXPECT_NEAR(double(top.size()), 5000, 250);
+    for (size_t i = 0; i < top.size(); ++i) ASSERT_GT(top.groupFromChild(i).translation.y, 4.4);
+}
+
+TEST(ProceduralScatter, isTheSameForAnyNumberOfThreads) {
+    for (const double spacing : {0.0, 0.8}) {
+        ScatterParams params = oneKind(100000);
+        params.clustering = 0.5;
+        params.tilt = 0.1;
+        params.spacing = spacing;
+        GridParams grid;
+        grid.count_x = 500, grid.count_z = 301;
+        grid.any_turn = true;
+        uint64_t hashes[2];
+        for (int t : {1, 4}) {
+            ThreadPool pool(t);
+            InstanceStore store(scatterDomain(params, {}));
+            scatter(params, {}, pool, store);
+            placeGrid(grid, pool, store);
+            hashes[t > 1] = hashStore(store);
+        }
+        EXPECT_EQ(hashes[0], hashes[1]);
+    }
+}
+
 TEST(ProceduralScatter, refusesNonsense) {
     const auto refused = [](auto&& change) {
         ScatterParams params = oneKind(10);
         change(params);
         InstanceStore store;
-        EXPECT_THROW(scatter(params, nullptr, store), Error);
+        ThreadPool pool(1);
+        EXPECT_THROW(scatter(params, {}, pool, store), Error);
     };
     refused([](ScatterParams& p) { p.items.clear(); });
     refused([](ScatterParams& p) { p.items[0].weight = 0.0; });
     refused([](ScatterParams& p) { p.items[0].weight = -1.0; });
     refused([](ScatterParams& p) { p.count = uint64_t(1) << 40; });
-    refused([](ScatterParams& p) { p.size = std::nan(""); });
+    refused([](ScatterParams& p) { p.size.x = std::nan(""); });
     refused([](ScatterParams& p) { p.min_scale = 0.0; });
     refused([](ScatterParams& p) { p.clustering = 2.0; });
 }
@@ -288,14 +370,15 @@ TEST(ProceduralGrid, turnsJittersScalesAndRises) {
 
 TEST(ProceduralGrid, refusesNonsense) {
     InstanceStore store;
+    ThreadPool pool(1);
     GridParams params;
     params.count_x = 0;
-    EXPECT_THROW(placeGrid(params, store), Error);
+    EXPECT_THROW(placeGrid(params, pool, store), Error);
     params.count_x = params.count_z = 4000000000u;
-    EXPECT_THROW(placeGrid(params, store), Error);
+    EXPECT_THROW(placeGrid(params, pool, store), Error);
     params.count_x = params.count_z = 2;
     params.spacing_x = std::nan("");
-    EXPECT_THROW(placeGrid(params, store), Error);
+    EXPECT_THROW(placeGrid(params, pool, store), Error);
 }
 
 }  // namespace

@@ -55,8 +55,8 @@ TEST(ProceduralTerrain, heightsSpanTheRelief) {
 TEST(ProceduralTerrain, fieldInterpolatesAndClamps) {
     // A slope: y = 3 (x + 5) on 3 x 3 samples over 10 m, so the normal is (-3, 1, 0) / sqrt(10).
     HeightField field;
-    field.resolution = 3;
-    field.size = 10.0;
+    field.columns = field.rows = 3;
+    field.size = DVec2(10.0);
     field.heights = {0, 15, 30, 0, 15, 30, 0, 15, 30};
     EXPECT_NEAR(field.height(0.0, 0.0), 15.0, 1e-9);
     EXPECT_NEAR(field.height(2.5, -4.0), 22.5, 1e-9);
