@@ -47,7 +47,8 @@ Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool&
             throw Error(ErrorCode::kUnsupported, oneLine(path, 300),
                         "is neither a scene file (*.scene.json) nor .gltf nor .glb");
         }
-        Scene scene = is_asset ? loadAsset(path, context) : readSceneFile(path, path, context);
+        Scene scene =
+            is_asset ? loadAsset(path, context) : readSceneFile(path, path, context, pool);
         scene.path = path;
         context.throwIfCancelled();
         buildScene(scene, pool);

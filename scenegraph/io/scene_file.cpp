@@ -134,7 +134,7 @@ ChildRef SceneReader::child(const std::string& child_name, const JsonPath& path)
 }
 
 Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
-                    LoadContext& context) {
+                    LoadContext& context, ThreadPool& pool) {
     SceneReader reader{context, oneLine(name, 300), context.folder, {}, {}, {}, {}};
     Json root;
     {
@@ -148,12 +148,8 @@ Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
     if (const auto problem = schema.firstProblem(root))
         reader.fail(problem->path, problem->message);
 
-    if (const auto assets = root.find("assets"); assets != root.end()) {
-        for (const auto& [asset_name, asset] : assets->items()) {
-            context.throwIfCancelled();
-            readAsset(reader, asset_name, asset);
-        }
-    }
+    if (const auto assets = root.find("assets"); assets != root.end())
+        readAssets(reader, *assets, pool);
     if (const auto groups = root.find("groups"); groups != root.end()) {
         const uint32_t first = uint32_t(reader.scene.groups.size());
         for (const auto& [group_name, unused] : groups->items()) {

@@ -9,6 +9,6 @@ namespace stipple {
 // Reads the file and everything it names. The scene is not yet built and has the file's cameras
 // only. name: how errors call the file. Throws Error with a JSON pointer.
 Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
-                    LoadContext& context);
+                    LoadContext& context, ThreadPool& pool);
 
 }  // namespace stipple
