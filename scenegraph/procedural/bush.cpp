@@ -83,7 +83,7 @@ TreeForm growHazel(uint64_t seed, float detail) {
     form.leaf_color_old = Vec3(1.0f, 0.86f, 0.6f);
     form.autumn_color = Vec3(0.5f, 0.38f, 0.06f);
     form.autumn_color_late = Vec3(0.4f, 0.22f, 0.05f);
-    form.leaf_area = 24.0f;
+    form.leaf_area = 34.0f;
     form.leaf_aspect = 0.8f;
     form.leaf_cluster = 2;
     form.leaf_droop = 0.2f;
@@ -171,13 +171,13 @@ TreeForm growBilberry(uint64_t seed, float detail) {
     form.leaf_color_old = Vec3(1.1f, 0.85f, 0.6f);
     form.autumn_color = Vec3(0.36f, 0.16f, 0.05f);
     form.autumn_color_late = Vec3(0.34f, 0.05f, 0.03f);
-    form.leaf_area = 2.6f;
+    form.leaf_area = 3.6f;
     form.leaf_aspect = 0.6f;
     form.leaf_cluster = 2;
     form.leaf_droop = 0.0f;
     form.leaf_spread = 0.4f;
     growBush(form.skeleton, rng, detail,
-             {.stems = 46,
+             {.stems = 60,
               .base_radius = 0.75f,
               .lean = {0.1, 0.7},
               .length = {0.24, 0.42},

@@ -90,7 +90,7 @@ TreeForm growSpruce(uint64_t seed, float detail) {
     form.bark_share = 0.15f;
     form.bark_color = Vec3(0.17f, 0.12f, 0.09f);
     form.leaf_kind = LeafKind::kNeedles;
-    form.leaf_color = Vec3(0.125f, 0.2f, 0.065f);
+    form.leaf_color = Vec3(0.1f, 0.165f, 0.055f);
     form.leaf_color_old = Vec3(0.75f, 0.9f, 1.0f);
     form.leaf_area = 480.0f;
     form.leaf_aspect = 0.26f;

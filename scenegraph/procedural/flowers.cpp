@@ -21,12 +21,12 @@ struct FlowerKind {
 };
 constexpr int kMostPetals = 14;
 const FlowerKind kFlowers[] = {
-    {"daisy", 0.4, 14, 0.028f, 0.36f, 0.1f, 0, Vec3(0.86f, 0.86f, 0.82f), Vec3(0.8f, 0.5f, 0.03f)},
-    {"buttercup", 0.45, 5, 0.018f, 0.95f, 0.55f, 0, Vec3(0.9f, 0.66f, 0.02f),
+    {"daisy", 0.4, 14, 0.034f, 0.36f, 0.1f, 0, Vec3(0.86f, 0.86f, 0.82f), Vec3(0.8f, 0.5f, 0.03f)},
+    {"buttercup", 0.45, 5, 0.026f, 0.95f, 0.55f, 0, Vec3(0.9f, 0.66f, 0.02f),
      Vec3(0.6f, 0.5f, 0.03f)},
-    {"poppy", 0.55, 5, 0.045f, 1.15f, 0.6f, 0, Vec3(0.72f, 0.045f, 0.015f),
+    {"poppy", 0.55, 5, 0.05f, 1.15f, 0.6f, 0, Vec3(0.72f, 0.045f, 0.015f),
      Vec3(0.03f, 0.03f, 0.03f)},
-    {"bluebell", 0.35, 4, 0.016f, 0.6f, -0.8f, 7, Vec3(0.2f, 0.16f, 0.62f),
+    {"bluebell", 0.35, 4, 0.02f, 0.6f, -0.8f, 7, Vec3(0.2f, 0.16f, 0.62f),
      Vec3(0.2f, 0.16f, 0.6f)}};
 
 void appendHead(SheetMesh& sheet, Rng& rng, const FlowerKind& kind, const Vec3& at,

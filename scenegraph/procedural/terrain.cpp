@@ -98,35 +98,29 @@ DVec3 groundColor(TerrainStyle style, uint64_t key, const GroundPlace& place) {
     const double patches = fractalNoise(key, p / 45.0, 4),
                  fine = fractalNoise(key + 50, p / 3.5, 3);
     // Strata show where rock is bare.
-    const double strata = std::sin(place.relative_height * 90.0 + 4.0 * patches);
+    const double strata = std::sin(place.relative_height * 60.0 + 3.0 * patches + 2.0 * regions);
     const DVec3 rock = glm::mix(DVec3(0.235, 0.22, 0.2), DVec3(0.32, 0.295, 0.26),
                                 0.5 + 0.25 * strata + 0.4 * patches) *
                        (1.0 + 0.35 * fine);
     const DVec3 scree = DVec3(0.27, 0.25, 0.22) * (1.0 + 0.3 * fine + 0.15 * patches);
-    DVec3 color;
+    DVec3 meadow = glm::mix(DVec3(0.085, 0.135, 0.03), DVec3(0.155, 0.185, 0.05),
+                            smoothStep(-0.6, 0.6, patches + 0.5 * fine + 0.6 * regions));
+    meadow =
+        glm::mix(meadow, DVec3(0.215, 0.18, 0.085),
+                 0.7 * smoothStep(0.2, 0.7, patches - 0.6 * hollow + 0.35 * fine - 0.5 * regions));
+    meadow = glm::mix(meadow, DVec3(0.06, 0.105, 0.028), 0.8 * smoothStep(0.1, 0.7, hollow));
+    DVec3 color = meadow;
     double rock_slope = radians(38.0);
-    if (style == TerrainStyle::kMeadow) {
-        color = glm::mix(DVec3(0.085, 0.135, 0.03), DVec3(0.155, 0.185, 0.05),
-                         smoothStep(-0.6, 0.6, patches + 0.5 * fine + 0.6 * regions));
-        color = glm::mix(
-            color, DVec3(0.215, 0.18, 0.085),
-            0.7 * smoothStep(0.2, 0.7, patches - 0.6 * hollow + 0.35 * fine - 0.5 * regions));
-        color = glm::mix(color, DVec3(0.06, 0.105, 0.028), 0.8 * smoothStep(0.1, 0.7, hollow));
-        color =
-            glm::mix(color, DVec3(0.14, 0.105, 0.07), smoothStep(0.75, 0.95, fine + 0.5 * patches));
-    } else if (style == TerrainStyle::kForestFloor) {
+    if (style == TerrainStyle::kForestFloor) {
         color = glm::mix(DVec3(0.075, 0.055, 0.034), DVec3(0.125, 0.09, 0.052),
                          smoothStep(-0.4, 0.4, fine));
         color = glm::mix(color, DVec3(0.055, 0.085, 0.025),
                          0.85 * smoothStep(-0.1, 0.35, patches + 0.6 * fine + 0.3 * hollow));
-    } else {
-        rock_slope = radians(31.0);
-        const DVec3 grass =
-            glm::mix(DVec3(0.085, 0.115, 0.038), DVec3(0.17, 0.15, 0.075),
-                     smoothStep(0.1, 0.5, place.relative_height + 0.3 * patches + 0.15 * regions));
-        color =
-            glm::mix(grass, scree,
-                     smoothStep(0.35, 0.55, place.relative_height + 0.2 * patches - 0.15 * hollow));
+    } else if (style == TerrainStyle::kMountain) {
+        rock_slope = radians(41.0);
+        const double high = place.relative_height + 0.12 * regions + 0.1 * patches;
+        color = glm::mix(meadow, DVec3(0.15, 0.135, 0.065), smoothStep(0.15, 0.4, high));
+        color = glm::mix(color, scree, smoothStep(0.38, 0.56, high - 0.15 * hollow));
     }
     color *= 1.0 + 0.22 * fine + 0.12 * patches;
     // Loose stones lie below the cliffs, where it is steep but not bare.
@@ -171,7 +165,7 @@ void appendWater(const HeightField& field, double level, uint64_t key, Generated
         const DVec2 p(-0.5 * field.size + double(i) * step, -0.5 * field.size + double(j) * step);
         const double depth = level - double(field.heights[j * n + i]);
         const double wind = fractalNoise(key, p / 160.0, 3);
-        const DVec3 shallow(0.12, 0.12, 0.075), deep(0.012, 0.03, 0.035);
+        const DVec3 shallow(0.055, 0.06, 0.04), deep(0.01, 0.024, 0.03);
         const DVec3 color = glm::mix(shallow, deep, smoothStep(-0.2, 3.5, depth + 0.5 * wind));
         const double roughness = 0.02 + 0.02 * smoothStep(-0.3, 0.4, wind);
         const DVec3 normal(roughness * fractalNoise(key + 10, p / 14.0, 2), 1.0,
@@ -197,7 +191,7 @@ void appendWater(const HeightField& field, double level, uint64_t key, Generated
     water.base_color = Vec3(1.0f);
     water.specular = Vec3(0.05f);
     water.shininess = 90.0f;
-    water.emissive = Vec3(0.13f, 0.185f, 0.25f);  // the sky it mirrors
+    water.emissive = Vec3(0.1f, 0.145f, 0.2f);  // the sky it mirrors
     terrain.materials.push_back(water);
 }
 
@@ -256,18 +250,22 @@ HeightField makeHeightField(const TerrainParams& params) {
         }
     }
     const float scale = high > low ? float(params.relief) / (high - low) : 0.0f;
-    for (float& h : field.heights) h = (h - low) * scale;
+    for (float& h : field.heights) {
+        h = (h - low) * scale;
+        // Mountains rise from wide valleys.
+        if (style == TerrainStyle::kMountain && scale > 0.0f)
+            h = float(params.relief) * std::pow(h / float(params.relief), 1.8f);
+    }
     const double water = params.water_level;
     if (params.erosion > 0.0 && scale > 0.0f) {
         erode(field, params.erosion, water, params.seed);
         // Back to the relief asked for; what lies under water is as it was.
         const auto [least, most] = std::minmax_element(field.heights.begin(), field.heights.end());
         const double base = water > 0.0 ? water : double(*least);
-        const double stretch =
-            (params.relief - (water > 0.0 ? water : 0.0)) / (double(*most) - base);
+        const double stretch = (params.relief - std::max(water, 0.0)) / (double(*most) - base);
         for (float& h : field.heights) {
-            const double above = double(h) - base;
-            h = above < 0.0 ? h : float(params.relief - (double(*most) - base - above) * stretch);
+            if (stretch > 0.0 && double(h) >= base)
+                h = float(params.relief - (double(*most) - double(h)) * stretch);
         }
     }
     if (water > 0.0) {

@@ -69,9 +69,11 @@ std::vector<LeafSite> placeLeaves(const Skeleton& skeleton, size_t count, Rng& r
     return sites;
 }
 
-// What is left of a colour where little sky is seen: darker, and less saturated.
-Vec3 inLight(const Vec3& color, float openness) {
-    const float open = std::min(1.0f, openness / 0.8f);
+// What is left of a colour where little sky is seen: darker, and less saturated. height: 0 at the
+// tree's foot, 1 at its top; neighbours and the ground take light from what is low.
+Vec3 inLight(const Vec3& color, float openness, float height) {
+    const float open =
+        std::min(1.0f, openness / 0.8f) * (0.55f + 0.45f * std::min(1.0f, 1.3f * height));
     const float grey = glm::dot(color, Vec3(0.25f, 0.6f, 0.15f));
     return glm::mix(Vec3(grey) * Vec3(0.88f, 0.97f, 0.9f), color, 0.6f + 0.4f * open) *
            (0.17f + 0.83f * open);
@@ -82,8 +84,8 @@ public:
     TreeBuilder(const TreeForm& form, uint64_t seed, Season season)
         : form_(form), rng_{hashCombine(seed, 0x7ee)}, foliage_(foliageIn(season, form)) {
         // Every tree has a tone of its own.
-        const float warm = uniform(rng_, -1.0, 1.0), value = uniform(rng_, 0.86, 1.1);
-        const Vec3 tone = Vec3(1.0f + 0.1f * warm, 1.0f, 1.0f - 0.1f * warm) * value;
+        const float warm = uniform(rng_, -1.0, 1.0), value = uniform(rng_, 0.8, 1.15);
+        const Vec3 tone = Vec3(1.0f + 0.16f * warm, 1.0f, 1.0f - 0.14f * warm) * value;
         foliage_.fresh *= tone;
         foliage_.old *= tone;
         brightest_ = 1.15f * glm::max(foliage_.fresh, foliage_.old);
@@ -140,8 +142,10 @@ GeneratedMesh TreeBuilder::build(size_t triangles, double height) {
 
     mesh_.triangle_material.resize(mesh_.triangles.size(), kBark);
     for (size_t i = 0; i < tube_vertices; ++i) {
-        const Vec3 color(mesh_.colors[i]);
-        mesh_.colors[i] = Vec4(inLight(color, light.at(mesh_.positions[i]).openness), 1.0f);
+        const Vec3 color = glm::clamp(Vec3(mesh_.colors[i]), Vec3(0.0f), Vec3(1.0f));
+        mesh_.colors[i] = Vec4(inLight(color, light.at(mesh_.positions[i]).openness,
+                                       mesh_.positions[i].y / float(form_.height)),
+                               1.0f);
     }
     for (const LeafSite& site : placeLeaves(skeleton, twiglet_count, rng_))
         appendTwiglet(site, light);
@@ -231,7 +235,7 @@ void TreeBuilder::appendBlade(const LeafSite& site, const CrownLight& light, flo
     const Vec3 normal = glm::cross(side, along);
     const Vec3 shading = normal * 0.5f + lit.outward * 0.7f;
     const Vec3 fold = side * 0.2f;
-    const Vec3 color = inLight(leafTint(site), lit.openness);
+    const Vec3 color = inLight(leafTint(site), lit.openness, site.position.y / float(form_.height));
     const Vec3 middle = base + along * (0.45f * length) + normal * (0.18f * width);
     const uint32_t v = uint32_t(mesh_.positions.size());
     vertex(base, glm::normalize(shading), color * 0.7f);
@@ -268,7 +272,7 @@ void TreeBuilder::appendNeedles(const LeafSite& site, const CrownLight& light, f
     const Vec3 normal = glm::cross(side, along);
     const Vec3 shading = glm::normalize(normal * 0.4f + lit.outward * 0.75f);
     const Vec3 base = site.position + randomUnit(rng_) * (form_.leaf_spread * length);
-    const Vec3 color = inLight(leafTint(site), lit.openness);
+    const Vec3 color = inLight(leafTint(site), lit.openness, site.position.y / float(form_.height));
     const Vec3 sag(0, -0.2f * std::max(form_.leaf_droop, 0.0f) * length, 0);
     // The lowest branches lie on the ground, their needles not below it.
     const auto aboveGround = [](const Vec3& p) { return Vec3(p.x, std::max(p.y, 0.02f), p.z); };

@@ -17,7 +17,7 @@ constexpr int kPinnaPairs = 16;
 // length.
 void appendFrond(SheetMesh& sheet, Rng& rng, const Vec3& outward, float length, const Vec3& fresh,
                  const Vec3& old) {
-    const float start = uniform(rng, 0.15, 0.5), bend = uniform(rng, 0.8, 1.7);  // off upright
+    const float start = uniform(rng, 0.35, 0.75), bend = uniform(rng, 0.7, 1.3);  // off upright
     const float value = uniform(rng, 0.75, 1.0), age = uniform(rng, 0.0, 1.0);
     const Vec3 color = glm::mix(fresh, old, age * age) * value;
     const Vec3 across(outward.z, 0.0f, -outward.x);
@@ -46,7 +46,7 @@ void appendFrond(SheetMesh& sheet, Rng& rng, const Vec3& outward, float length, 
             for (const float hand : {-1.0f, 1.0f}) {
                 const Vec3 out = glm::normalize(across * hand + along * uniform(rng, 0.2, 0.45) -
                                                 up * uniform(rng, 0.0, 0.3));
-                const Vec3 width = along * (0.032f * length * (1.0f - 0.5f * u));
+                const Vec3 width = along * (0.046f * length * (1.0f - 0.5f * u));
                 sheet.leaf(p, p + out * reach, width,
                            glm::normalize(up + Vec3(0, 0.6f, 0) + out * 0.25f),
                            color * light * uniform(rng, 0.9, 1.05));
