@@ -180,7 +180,7 @@ TreeForm growOak(uint64_t seed, float detail) {
     form.winter_leaves = 0.04f;
     form.leaf_cluster = 4;
     form.bark_share = 0.2f;
-    form.leaf_area = 450.0f;
+    form.leaf_area = 400.0f;
     form.leaf_aspect = 0.62f;
     form.leaf_droop = 0.25f;
     form.leaf_spread = 0.9f;
@@ -222,7 +222,7 @@ TreeForm growBeech(uint64_t seed, float detail) {
     form.autumn_color_late = Vec3(0.4f, 0.12f, 0.025f);
     form.winter_leaves = 0.02f;
     form.bark_share = 0.18f;
-    form.leaf_area = 640.0f;
+    form.leaf_area = 560.0f;
     form.leaf_aspect = 0.62f;
     form.leaf_cluster = 3;
     form.leaf_droop = 0.1f;

@@ -92,7 +92,7 @@ TreeForm growSpruce(uint64_t seed, float detail) {
     form.leaf_kind = LeafKind::kNeedles;
     form.leaf_color = Vec3(0.1f, 0.165f, 0.055f);
     form.leaf_color_old = Vec3(0.75f, 0.9f, 1.0f);
-    form.leaf_area = 480.0f;
+    form.leaf_area = 350.0f;
     form.leaf_aspect = 0.26f;
     form.leaf_droop = 0.22f;
     form.leaf_spread = 0.05f;
