@@ -64,7 +64,7 @@ GeneratedMesh makeGrass(const GrassParams& params);
 struct FernParams {
     uint64_t seed = 1;
     double height = 0.7;  // metres, of the highest frond; the fern is about twice as wide
-    int fronds = 11;      // 1..10000, 74 triangles each
+    int fronds = 11;      // 1..10000, 73 triangles each
     std::string season = "summer";
 };
 GeneratedMesh makeFern(const FernParams& params);
