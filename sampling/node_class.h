@@ -24,7 +24,7 @@ inline constexpr double kMostOverdraw = 8.0;
 inline constexpr float kThinNode = 2.0f;
 // A batch is drawn anew in each tile it touches, so what is drawn as points is opened to this share
 // of a tile.
-inline constexpr float kTileShare = 0.25f;
+inline constexpr float kTileShare = 0.0833f;
 
 // area_scale: largest area scale of the instance. Depends on nothing but the node and the view, so
 // planning and drawing agree.

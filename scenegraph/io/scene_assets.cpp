@@ -4,7 +4,10 @@
 #include <scenegraph/io/picture.h>
 #include <scenegraph/io/scene_reader.h>
 
+#include <exception>
 #include <limits>
+#include <mutex>
+#include <optional>
 
 namespace stipple {
 
@@ -33,10 +36,12 @@ ChildRef loadFile(SceneReader& reader, const Json& asset, const JsonPath& path) 
     return reader.files[full.string()] = child;
 }
 
-GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json& asset,
-                       const JsonPath& path) {
+// May run in several threads; `mutex` guards the reader.
+GeneratedMesh generate(SceneReader& reader, std::mutex& mutex, const std::string& name,
+                       const Json& asset, const JsonPath& path) {
     const std::string kind = asset["generate"].get<std::string>();
     const auto takeTriangles = [&](double triangles) {
+        const std::lock_guard lock(mutex);
         // Leaves and blades share few vertices: two for each triangle.
         reader.context.budget.take(triangles * (kBytesPerTriangle + 2.0 * kBytesPerVertex),
                                    reader.where(path),
@@ -48,8 +53,28 @@ GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json&
         readMember(asset, "seed", p.seed);
         readMember(asset, "height", p.height);
         readMember(asset, "triangles", p.triangles);
+        readMember(asset, "season", p.season);
         takeTriangles(p.triangles);
         return makeTree(p);
+    }
+    if (kind == "bush") {
+        BushParams p;
+        readMember(asset, "species", p.species);
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "height", p.height);
+        readMember(asset, "triangles", p.triangles);
+        readMember(asset, "season", p.season);
+        takeTriangles(p.triangles);
+        return makeBush(p);
+    }
+    if (kind == "deadwood") {
+        DeadwoodParams p;
+        readMember(asset, "form", p.form);
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "length", p.length);
+        readMember(asset, "triangles", p.triangles);
+        takeTriangles(p.triangles);
+        return makeDeadwood(p);
     }
     if (kind == "grass") {
         GrassParams p;
@@ -57,9 +82,40 @@ GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json&
         readMember(asset, "height", p.height);
         readMember(asset, "radius", p.radius);
         readMember(asset, "blades", p.blades);
+        readMember(asset, "season", p.season);
         constexpr double kMostTrianglesPerBlade = 16.0;
         takeTriangles(p.blades * kMostTrianglesPerBlade);
         return makeGrass(p);
+    }
+    if (kind == "fern") {
+        FernParams p;
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "height", p.height);
+        readMember(asset, "fronds", p.fronds);
+        readMember(asset, "season", p.season);
+        constexpr double kMostTrianglesPerFrond = 80.0;
+        takeTriangles(p.fronds * kMostTrianglesPerFrond);
+        return makeFern(p);
+    }
+    if (kind == "flowers") {
+        FlowersParams p;
+        readMember(asset, "species", p.species);
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "height", p.height);
+        readMember(asset, "radius", p.radius);
+        readMember(asset, "stems", p.stems);
+        constexpr double kMostTrianglesPerStem = 70.0;
+        takeTriangles(p.stems * kMostTrianglesPerStem);
+        return makeFlowers(p);
+    }
+    if (kind == "litter") {
+        LitterParams p;
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "radius", p.radius);
+        readMember(asset, "leaves", p.leaves);
+        readMember(asset, "season", p.season);
+        takeTriangles(2.0 * p.leaves);
+        return makeLitter(p);
     }
     if (kind == "rock") {
         RockParams p;
@@ -77,10 +133,15 @@ GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json&
         readMember(asset, "relief", p.relief);
         readMember(asset, "feature_size", p.feature_size);
         readMember(asset, "style", p.style);
-        takeTriangles(2.0 * (p.resolution - 1.0) * (p.resolution - 1.0));
-        HeightField& field = reader.terrains[name];
-        field = makeHeightField(p);
-        return makeTerrain(p, field);
+        readMember(asset, "erosion", p.erosion);
+        readMember(asset, "water_level", p.water_level);
+        const double surfaces = p.water_level > 0.0 ? 2.0 : 1.0;
+        takeTriangles(surfaces * 2.0 * (p.resolution - 1.0) * (p.resolution - 1.0));
+        HeightField field = makeHeightField(p);
+        GeneratedMesh result = makeTerrain(p, field);
+        const std::lock_guard lock(mutex);
+        reader.terrains[name] = std::move(field);
+        return result;
     }
     int triangles = 1000;
     Vec3 color(0.8f);
@@ -182,17 +243,41 @@ ChildRef addGenerated(SceneReader& reader, const std::string& name, GeneratedMes
 
 }  // namespace
 
-void readAsset(SceneReader& reader, const std::string& name, const Json& asset) {
-    const JsonPath path = {"assets", name};
-    if (asset.contains("file")) {
-        reader.children[name] = loadFile(reader, asset, path);
-        return;
-    }
-    GeneratedMesh generated = withPlace(reader, path, [&] {
-        return asset.contains("height_map") ? heightMapTerrain(reader, name, asset, path)
-                                            : generate(reader, name, asset, path);
+void readAssets(SceneReader& reader, const Json& assets) {
+    struct Job {
+        std::string name;
+        const Json* asset;
+        std::optional<GeneratedMesh> result;  // nothing: from a file
+        std::exception_ptr error;
+    };
+    std::vector<Job> jobs;
+    for (const auto& [name, asset] : assets.items()) jobs.push_back({name, &asset, {}, {}});
+    std::mutex mutex;
+    reader.pool.forEach(jobs.size(), [&](size_t i, int) {
+        Job& job = jobs[i];
+        if (!job.asset->contains("generate")) return;
+        const JsonPath path = {"assets", job.name};
+        try {
+            reader.context.throwIfCancelled();
+            job.result = withPlace(
+                reader, path, [&] { return generate(reader, mutex, job.name, *job.asset, path); });
+        } catch (...) {  // the first one in order is reported, whatever the number of threads
+            job.error = std::current_exception();
+        }
     });
-    reader.children[name] = addGenerated(reader, name, std::move(generated), path);
+    for (Job& job : jobs) {
+        if (job.error) std::rethrow_exception(job.error);
+        const JsonPath path = {"assets", job.name};
+        reader.context.throwIfCancelled();
+        if (job.asset->contains("height_map")) {
+            job.result = withPlace(
+                reader, path, [&] { return heightMapTerrain(reader, job.name, *job.asset, path); });
+        }
+        reader.children[job.name] =
+            job.result ? addGenerated(reader, job.name, std::move(*job.result), path)
+                       : loadFile(reader, *job.asset, path);
+        job.result.reset();
+    }
 }
 
 }  // namespace stipple

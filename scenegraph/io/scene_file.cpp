@@ -157,13 +157,16 @@ void forEachMember(SceneReader& reader, std::vector<SceneDocument>& documents, c
 }
 
 void readAssetsAndGroups(SceneReader& reader, std::vector<SceneDocument>& documents) {
-    forEachMember(
-        reader, documents, "assets",
-        [&](SceneDocument&, const std::string& name, const Json& asset) {
+    for (SceneDocument& document : documents) {
+        reader.name = document.name, reader.folder = document.folder;
+        const auto assets = document.root.find("assets");
+        if (assets == document.root.end()) continue;
+        for (const auto& [name, asset] : assets->items()) {
             if (reader.children.contains(name))
                 reader.fail({"assets", name}, "an included file has an asset of this name");
-            readAsset(reader, name, asset);
-        });
+        }
+        readAssets(reader, *assets);
+    }
     forEachMember(
         reader, documents, "groups", [&](SceneDocument&, const std::string& name, const Json&) {
             const uint32_t index = uint32_t(reader.scene.groups.size());

@@ -3,6 +3,7 @@
 // (scene_lights.cpp), the rest (scene_file.cpp). Internal.
 #pragma once
 
+#include <core/parallel.h>
 #include <scenegraph/io/json.h>
 #include <scenegraph/io/load_context.h>
 #include <scenegraph/procedural/generators.h>
@@ -34,8 +35,9 @@ struct SceneReader {
     std::filesystem::path file(const Json& value, const JsonPath& path) const;
 };
 
-// Adds the asset's meshes, materials and textures, and its name.
-void readAsset(SceneReader& reader, const std::string& name, const Json& asset);
+// Adds the assets' meshes, materials and textures, and their names. What is generated is so in
+// parallel.
+void readAssets(SceneReader& reader, const Json& assets);
 
 // Adds the instances of groups[index], whose name is in reader.children already. instances: the
 // group's explicit ones, which have been taken out of `group` and are not yet validated.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Oak and birch: limbs reach for a crown's outline, branches and twigs fill it.
+// Oak, beech and birch: limbs reach for a crown's outline, branches and twigs fill it.
 // Based on: Weber, Penn. Creation and Rendering of Realistic Trees. 1995 (levels of stems with
 // angle, length, curve and taper each).
 #include <scenegraph/procedural/noise.h>
@@ -40,8 +40,8 @@ Vec3 branchTint(Rng& rng) {
 }
 
 // Branches from a fraction of a limb (or of the trunk) on, crooked, with twigs.
-void addOakBranches(Skeleton& s, Rng& rng, const CrownOutline& outline, uint32_t limb, float from,
-                    float detail) {
+void addBroadleafBranches(Skeleton& s, Rng& rng, const CrownOutline& outline, uint32_t limb,
+                          float from, float detail) {
     const Stem parent = s.stems[limb];
     const int count = countFor(rng, parent.length * (1.0f - from) * 2.6f * std::sqrt(detail), 3);
     float azimuth = uniform(rng, 0.0, 2.0 * kPi);
@@ -122,16 +122,63 @@ void addBirchBranches(Skeleton& s, Rng& rng, uint32_t limb, float detail) {
     }
 }
 
+// A trunk with limbs that reach for the outline, spiralling up.
+struct BroadleafShape {
+    CrownOutline outline;
+    Growth trunk;
+    int limbs = 20;
+    float first_limb = 0.2f;        // fraction of the trunk
+    Range limb_angle = {1.3, 0.5};  // off the trunk, of the lowest and of the highest limb, radians
+    float limb_wander = 0.15f;
+    float limb_lift = 0.7f;
+};
+
+void growBroadleaf(Skeleton& s, Rng& rng, float detail, const BroadleafShape& shape) {
+    const uint32_t trunk =
+        growStem(s, rng, Vec3(0.0f, -0.3f, 0.0f), nearlyUp(rng, 0.08), shape.trunk, 0);
+    std::vector<uint32_t> limbs;
+    const float first_azimuth = uniform(rng, 0.0, 2.0 * kPi);
+    for (int i = 0; i < shape.limbs; ++i) {
+        const float f = (float(i) + uniform(rng, 0.1, 0.9)) / float(shape.limbs);
+        const float at = glm::mix(shape.first_limb, 0.95f, f);
+        const float angle = float(glm::mix(shape.limb_angle.lo, shape.limb_angle.hi, double(f))) +
+                            uniform(rng, -0.18, 0.18);
+        const float azimuth = first_azimuth + kGoldenAngle * float(i) + uniform(rng, -0.4, 0.4);
+        const StemNode node = s.at(s.stems[trunk], at);
+        const Vec3 direction = offAxis(s.direction(s.stems[trunk], at), angle, azimuth);
+        const float length =
+            shape.outline.reach(node.position, direction, 9.5f) * uniform(rng, 0.8, 1.03);
+        const float radius = std::min(0.66f * node.radius, 0.03f + 0.027f * length);
+        limbs.push_back(growStem(s, rng, node.position, direction,
+                                 {.length = length,
+                                  .segments = 9,
+                                  .radius = radius,
+                                  .tip_radius = 0.012f,
+                                  .taper = 0.9f,
+                                  .wander = shape.limb_wander,
+                                  .lift_base = 0.15f,
+                                  .lift_tip = shape.limb_lift},
+                                 1));
+    }
+    for (const uint32_t limb : limbs)
+        addBroadleafBranches(s, rng, shape.outline, limb, 0.3f, detail);
+    addBroadleafBranches(s, rng, shape.outline, trunk, 0.66f, detail);
+}
+
 }  // namespace
 
 TreeForm growOak(uint64_t seed, float detail) {
     Rng rng{hashCombine(seed, 0x0a)};
     TreeForm form;
     form.height = 16.0;
-    form.root_flare = 0.4f;
+    form.tubes = {.root_flare = 0.45f, .relief = 0.07f, .seed = hashCombine(seed, 0x0d)};
     form.bark_color = Vec3(0.15f, 0.115f, 0.085f);
-    form.leaf_color = Vec3(0.185f, 0.295f, 0.05f);
+    form.leaf_color = Vec3(0.175f, 0.265f, 0.05f);
     form.leaf_color_old = Vec3(1.0f, 0.83f, 0.6f);
+    form.autumn_color = Vec3(0.33f, 0.24f, 0.05f);
+    form.autumn_color_late = Vec3(0.34f, 0.14f, 0.035f);
+    form.winter_leaves = 0.04f;
+    form.leaf_cluster = 4;
     form.bark_share = 0.2f;
     form.leaf_area = 400.0f;
     form.leaf_aspect = 0.62f;
@@ -144,45 +191,65 @@ TreeForm growOak(uint64_t seed, float detail) {
         return glm::mix(Vec3(0.72f + 0.4f * n), Vec3(0.62f, 0.85f, 0.45f), moss);
     };
 
-    Skeleton& s = form.skeleton;
-    const CrownOutline outline{Vec3(0.0f, 9.0f, 0.0f), 6.1f, 6.9f, 6.0f, 0.11f,
-                               hashCombine(seed, 0x0c)};
-    const uint32_t trunk = growStem(s, rng, Vec3(0.0f, -0.3f, 0.0f), nearlyUp(rng, 0.08),
-                                    {.length = 12.6f,
-                                     .segments = 24,
-                                     .radius = 0.4f,
-                                     .tip_radius = 0.05f,
-                                     .taper = 0.85f,
-                                     .wander = 0.045f,
-                                     .lift_base = 0.3f,
-                                     .lift_tip = 0.3f},
-                                    0);
-    std::vector<uint32_t> limbs;
-    const int limb_count = 22;
-    const float first_azimuth = uniform(rng, 0.0, 2.0 * kPi);
-    for (int i = 0; i < limb_count; ++i) {
-        const float f = (float(i) + uniform(rng, 0.2, 0.8)) / float(limb_count);
-        const float at = 0.23f + 0.72f * f;
-        const float angle = glm::mix(1.35f, 0.55f, f) + uniform(rng, -0.15, 0.15);
-        const float azimuth = first_azimuth + kGoldenAngle * float(i) + uniform(rng, -0.3, 0.3);
-        const StemNode node = s.at(s.stems[trunk], at);
-        const Vec3 direction = offAxis(s.direction(s.stems[trunk], at), angle, azimuth);
-        const float length =
-            outline.reach(node.position, direction, 8.5f) * uniform(rng, 0.86, 1.02);
-        const float radius = std::min(0.64f * node.radius, 0.03f + 0.026f * length);
-        limbs.push_back(growStem(s, rng, node.position, direction,
-                                 {.length = length,
-                                  .segments = 9,
-                                  .radius = radius,
-                                  .tip_radius = 0.012f,
-                                  .taper = 0.9f,
-                                  .wander = 0.17f,
-                                  .lift_base = 0.15f,
-                                  .lift_tip = 0.75f},
-                                 1));
-    }
-    for (const uint32_t limb : limbs) addOakBranches(s, rng, outline, limb, 0.33f, detail);
-    addOakBranches(s, rng, outline, trunk, 0.66f, detail);
+    growBroadleaf(
+        form.skeleton, rng, detail,
+        {.outline = {Vec3(0.0f, 9.0f, 0.0f), 6.9f, 6.9f, 5.6f, 0.17f, hashCombine(seed, 0x0c)},
+         .trunk = {.length = 12.2f,
+                   .segments = 24,
+                   .radius = 0.42f,
+                   .tip_radius = 0.05f,
+                   .taper = 0.85f,
+                   .wander = 0.06f,
+                   .lift_base = 0.3f,
+                   .lift_tip = 0.3f},
+         .limbs = 17,
+         .first_limb = 0.2f,
+         .limb_angle = {1.3, 0.5},
+         .limb_wander = 0.2f,
+         .limb_lift = 0.8f});
+    return form;
+}
+
+TreeForm growBeech(uint64_t seed, float detail) {
+    Rng rng{hashCombine(seed, 0x4a)};
+    TreeForm form;
+    form.height = 22.0;
+    form.tubes = {.root_flare = 0.5f, .relief = 0.015f, .seed = hashCombine(seed, 0x4d)};
+    form.bark_color = Vec3(0.29f, 0.285f, 0.265f);
+    form.leaf_color = Vec3(0.17f, 0.285f, 0.045f);
+    form.leaf_color_old = Vec3(1.05f, 0.9f, 0.65f);
+    form.autumn_color = Vec3(0.5f, 0.27f, 0.035f);
+    form.autumn_color_late = Vec3(0.4f, 0.12f, 0.025f);
+    form.winter_leaves = 0.02f;
+    form.bark_share = 0.18f;
+    form.leaf_area = 560.0f;
+    form.leaf_aspect = 0.62f;
+    form.leaf_cluster = 3;
+    form.leaf_droop = 0.1f;
+    form.leaf_spread = 0.75f;
+    const uint64_t bark_key = hashCombine(seed, 0x4b);
+    form.bark = [bark_key](const Stem&, float, float, const Vec3& p) {
+        // Smooth and silvery, with blotches of lichen and a green foot.
+        const float n = float(fractalNoise(bark_key, DVec3(p) * DVec3(2.5, 1.8, 2.5), 3));
+        const float moss = float(smoothStep(1.8, 0.0, p.y + 1.2 * n)) * 0.6f;
+        return glm::mix(Vec3(0.72f + 0.35f * n), Vec3(0.35f, 0.52f, 0.22f), moss);
+    };
+    growBroadleaf(
+        form.skeleton, rng, detail,
+        {.outline = {Vec3(0.0f, 12.5f, 0.0f), 6.6f, 9.4f, 8.2f, 0.12f, hashCombine(seed, 0x4c)},
+         .trunk = {.length = 18.5f,
+                   .segments = 26,
+                   .radius = 0.4f,
+                   .tip_radius = 0.04f,
+                   .taper = 0.9f,
+                   .wander = 0.03f,
+                   .lift_base = 0.5f,
+                   .lift_tip = 0.4f},
+         .limbs = 26,
+         .first_limb = 0.24f,
+         .limb_angle = {1.15, 0.4},
+         .limb_wander = 0.11f,
+         .limb_lift = 0.45f});
     return form;
 }
 
@@ -190,12 +257,15 @@ TreeForm growBirch(uint64_t seed, float detail) {
     Rng rng{hashCombine(seed, 0x1a)};
     TreeForm form;
     form.height = 18.0;
-    form.root_flare = 0.3f;
+    form.tubes = {.root_flare = 0.3f, .relief = 0.02f, .seed = hashCombine(seed, 0x1d)};
     form.bark_color = Vec3(0.74f, 0.72f, 0.67f);
     form.bark_share = 0.22f;
     form.bark_marks = 90;
     form.leaf_color = Vec3(0.25f, 0.355f, 0.065f);
     form.leaf_color_old = Vec3(1.0f, 0.88f, 0.55f);
+    form.autumn_color = Vec3(0.62f, 0.42f, 0.05f);
+    form.autumn_color_late = Vec3(0.5f, 0.26f, 0.04f);
+    form.leaf_cluster = 2;
     form.leaf_area = 155.0f;
     form.leaf_aspect = 0.7f;
     form.leaf_droop = 0.75f;

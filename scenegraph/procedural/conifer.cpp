@@ -85,16 +85,18 @@ TreeForm growSpruce(uint64_t seed, float detail) {
     Rng rng{hashCombine(seed, 0x2a)};
     TreeForm form;
     form.height = 24.0;
-    form.root_flare = 0.3f;
+    form.tubes = {.root_flare = 0.35f, .relief = 0.04f, .seed = hashCombine(seed, 0x2d)};
+    form.evergreen = true;
     form.bark_share = 0.15f;
     form.bark_color = Vec3(0.17f, 0.12f, 0.09f);
     form.leaf_kind = LeafKind::kNeedles;
-    form.leaf_color = Vec3(0.125f, 0.2f, 0.065f);
+    form.leaf_color = Vec3(0.1f, 0.165f, 0.055f);
     form.leaf_color_old = Vec3(0.75f, 0.9f, 1.0f);
-    form.leaf_area = 470.0f;
-    form.leaf_droop = 0.14f;
+    form.leaf_area = 350.0f;
+    form.leaf_aspect = 0.26f;
+    form.leaf_droop = 0.22f;
     form.leaf_spread = 0.05f;
-    form.needle_angle = 0.7f;
+    form.needle_angle = 0.8f;
     form.needle_flat = true;
     const uint64_t bark_key = hashCombine(seed, 0x2b);
     form.bark = [bark_key](const Stem&, float, float, const Vec3& p) {
@@ -167,16 +169,19 @@ TreeForm growPine(uint64_t seed, float detail) {
     Rng rng{hashCombine(seed, 0x3a)};
     TreeForm form;
     form.height = 20.0;
-    form.root_flare = 0.25f;
+    form.tubes = {.root_flare = 0.25f, .relief = 0.06f, .seed = hashCombine(seed, 0x3d)};
+    form.evergreen = true;
     form.bark_share = 0.22f;
     form.bark_color = Vec3(0.42f, 0.2f, 0.1f);
     form.leaf_kind = LeafKind::kNeedles;
     form.leaf_color = Vec3(0.175f, 0.235f, 0.085f);
     form.leaf_color_old = Vec3(0.8f, 0.93f, 1.0f);
-    form.leaf_area = 200.0f;
+    form.leaf_area = 210.0f;
+    form.leaf_aspect = 0.13f;
+    form.leaf_cluster = 7;
     form.leaf_droop = -0.2f;
-    form.leaf_spread = 0.1f;
-    form.needle_angle = 0.85f;
+    form.leaf_spread = 0.08f;
+    form.needle_angle = 0.95f;
     const uint64_t bark_key = hashCombine(seed, 0x3b);
     form.bark = [bark_key](const Stem& stem, float, float, const Vec3& p) {
         const float n = float(fractalNoise(bark_key, DVec3(p) * DVec3(5.0, 2.5, 5.0), 2));

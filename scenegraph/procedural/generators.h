@@ -20,23 +20,73 @@ struct GeneratedMesh {
 };
 
 struct TreeParams {
-    std::string species = "oak";  // oak, birch, spruce, pine
+    std::string species = "oak";  // oak, beech, birch, spruce, pine
     uint64_t seed = 1;
-    double height = 0.0;    // metres; 0: the species' own
-    int triangles = 20000;  // about this many (within 10 %), 1000..2000000
+    double height = 0.0;            // metres; 0: the species' own
+    int triangles = 20000;          // about this many (within 10 %), 1000..2000000
+    std::string season = "summer";  // spring, summer, autumn, winter: leaves' colour and amount
 };
 // The trunk stands at the origin, the highest leaf is at `height`, roots reach a little below y =
-// 0. About 10 ms for 20 000 triangles.
+// 0. Every seed has a tone of its own. About 10 ms for 20 000 triangles.
 GeneratedMesh makeTree(const TreeParams& params);
 std::vector<std::string> treeSpecies();
+
+struct BushParams {
+    std::string species = "hazel";  // hazel (many stems), juniper (needles), bilberry (a low mat)
+    uint64_t seed = 1;
+    double height = 0.0;   // metres; 0: the species' own
+    int triangles = 6000;  // about this many (within 10 %), 1000..2000000
+    std::string season = "summer";
+};
+// Stands at the origin like a tree, several stems from the ground.
+GeneratedMesh makeBush(const BushParams& params);
+std::vector<std::string> bushSpecies();
+
+struct DeadwoodParams {
+    std::string form = "snag";  // snag (dead standing tree), log (fallen trunk along x), stump
+    uint64_t seed = 1;
+    double length = 0.0;   // metres, height of a snag or stump, length of a log; 0: the form's own
+    int triangles = 4000;  // at most this many, 500..2000000
+};
+// Stands or lies on y = 0 around the origin and reaches a little below.
+GeneratedMesh makeDeadwood(const DeadwoodParams& params);
+std::vector<std::string> deadwoodForms();
 
 struct GrassParams {
     uint64_t seed = 1;
     double height = 0.35;  // metres, of the longest blades
     double radius = 0.5;   // metres, of the tuft
     int blades = 120;
+    std::string season = "summer";
 };
 GeneratedMesh makeGrass(const GrassParams& params);
+
+struct FernParams {
+    uint64_t seed = 1;
+    double height = 0.7;  // metres, of the highest frond; the fern is about twice as wide
+    int fronds = 11;      // 1..10000, 73 triangles each
+    std::string season = "summer";
+};
+GeneratedMesh makeFern(const FernParams& params);
+
+struct FlowersParams {
+    std::string species = "daisy";  // daisy, buttercup, poppy, bluebell
+    uint64_t seed = 1;
+    double height = 0.0;  // metres, of the highest; 0: the species' own
+    double radius = 0.5;  // metres, of the patch
+    int stems = 24;       // 1..200000, each about 20 triangles
+};
+GeneratedMesh makeFlowers(const FlowersParams& params);
+std::vector<std::string> flowerSpecies();
+
+// What lies on a forest's floor: fallen leaves, twigs, small green leaves between.
+struct LitterParams {
+    uint64_t seed = 1;
+    double radius = 1.0;  // metres
+    int leaves = 160;     // 1..200000, 2 triangles each
+    std::string season = "summer";
+};
+GeneratedMesh makeLitter(const LitterParams& params);
 
 struct RockParams {
     uint64_t seed = 1;
@@ -64,13 +114,17 @@ struct TerrainParams {
     double feature_size = 400.0;  // metres, of the largest hills
     std::string style =
         "meadow";  // meadow (green, rock where steep), forest_floor, mountain (rock, snow on top)
+    double erosion = 0.0;      // 0..1: how far rain has cut valleys into it
+    double water_level = 0.0;  // metres above the lowest place: lakes fill what lies below, 0: dry
 };
+std::vector<std::string> terrainStyles();
 HeightField makeHeightField(const TerrainParams& params);
 // The height field as a mesh with smooth normals and texture coordinates that span it, u along x
 // and v along z.
 Mesh heightFieldMesh(const HeightField& field);
-// The same without texture coordinates, coloured by height and slope; of `params` only style and
-// seed count.
+// The same without texture coordinates, coloured by height and slope; over what lies below the
+// water level, a second, flat surface with a material of its own ("water"). Of `params` only style,
+// seed and water_level count.
 GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field);
 
 // A simple body for test scenes: "sphere" (diameter 1), "box" (side 1), "plane" (side 1, facing

@@ -2,6 +2,7 @@
 #include <core/error.h>
 #include <core/rng.h>
 #include <scenegraph/procedural/generators.h>
+#include <scenegraph/procedural/season.h>
 #include <scenegraph/procedural/stem.h>
 
 namespace stipple {
@@ -65,6 +66,7 @@ GeneratedMesh makeGrass(const GrassParams& params) {
             ErrorCode::kInvalidArgument, "",
             "a grass tuft's height must be in 0.001..1000 and its radius in 0..1000 metres");
     }
+    const Season season = seasonByName(params.season);
     GeneratedMesh result;
     Mesh& mesh = result.mesh;
     mesh.name = "grass";
@@ -96,7 +98,20 @@ GeneratedMesh makeGrass(const GrassParams& params) {
     mesh.triangle_material.assign(mesh.triangles.size(), 0);
     Material material;
     material.name = "grass";
-    material.base_color = Vec3(0.21f, 0.285f, 0.06f);
+    switch (season) {
+        case Season::kSpring:
+            material.base_color = Vec3(0.2f, 0.31f, 0.055f);
+            break;
+        case Season::kSummer:
+            material.base_color = Vec3(0.21f, 0.27f, 0.065f);
+            break;
+        case Season::kAutumn:
+            material.base_color = Vec3(0.3f, 0.27f, 0.09f);
+            break;
+        case Season::kWinter:
+            material.base_color = Vec3(0.33f, 0.265f, 0.14f);
+            break;
+    }
     material.double_sided = true;
     material.translucency = 0.4f;
     result.materials.push_back(material);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <scenegraph/procedural/stem.h>
 
+#include <scenegraph/procedural/noise.h>
+
 #include <algorithm>
 #include <numeric>
 
@@ -10,25 +12,33 @@ namespace {
 
 struct TubeShape {
     int sides = 3;
-    uint32_t stride = 1;  // every stride-th node gets a ring
+    uint32_t stride = 1;   // every stride-th node gets a ring ...
+    uint32_t between = 1;  // ... and each step from ring to ring is cut into so many
 
-    size_t rings(const Stem& stem) const { return (stem.node_count - 2) / stride + 1; }
+    size_t rings(const Stem& stem) const {
+        return size_t((stem.node_count - 2) / stride) * between + 1;
+    }
     size_t triangles(const Stem& stem) const { return ((rings(stem) - 1) * 2 + 1) * size_t(sides); }
 };
 
-// Thick stems get more sides; a small budget also takes every other ring.
+// Thick stems get more sides; a small budget also takes every other ring, a large one shows the
+// trunk's relief.
 TubeShape tubeShape(const Stem& stem, float radius, float trunk_radius, size_t triangle_budget) {
     TubeShape shape;
     const float detail = std::sqrt(float(triangle_budget) / 6000.0f);
     const float sides = 2.5f + 6.0f * std::sqrt(radius / trunk_radius) * std::min(detail, 2.0f);
     shape.sides = std::clamp(int(sides), 3, stem.level == 0 ? 14 : 9);
-    if (stem.level == 0) shape.sides = std::max(shape.sides, 5);
+    if (stem.level == 0 && radius > 0.5f * trunk_radius) shape.sides = std::max(shape.sides, 5);
     shape.stride = detail < 0.4f ? 3 : detail < 0.8f ? 2 : 1;
+    if (stem.level == 0 && detail > 1.4f) {
+        shape.sides = std::max(shape.sides, 20);
+        shape.between = 3;
+    }
     return shape;
 }
 
 void appendTube(const Skeleton& skeleton, const Stem& stem, const TubeShape& shape,
-                float root_flare, const BarkColor& color, uint16_t material, Mesh& mesh) {
+                const TubeStyle& style, const BarkColor& color, uint16_t material, Mesh& mesh) {
     const StemNode* nodes = skeleton.nodesOf(stem);
     const size_t ring_count = shape.rings(stem);
     const uint32_t first = uint32_t(mesh.positions.size());
@@ -36,8 +46,11 @@ void appendTube(const Skeleton& skeleton, const Stem& stem, const TubeShape& sha
     Vec3 axis = glm::normalize(nodes[1].position - nodes[0].position), side, third;
     completeFrame(axis, side, third);
     for (size_t r = 0; r < ring_count; ++r) {
-        const uint32_t n = uint32_t(r) * shape.stride;
+        const float place = float(r) * float(shape.stride) / float(shape.between);
+        const uint32_t n = std::min(uint32_t(place), stem.node_count - 2);
         const uint32_t before = n == 0 ? 0 : n - 1;
+        const float fraction = place / float(stem.node_count - 1);
+        const StemNode node = skeleton.at(stem, fraction);
         axis = glm::normalize(nodes[n + 1].position - nodes[before].position);
         // Carried along without twist: the last ring's frame, made perpendicular again.
         side = glm::normalize(side - axis * glm::dot(side, axis));
@@ -45,19 +58,29 @@ void appendTube(const Skeleton& skeleton, const Stem& stem, const TubeShape& sha
         const float slope =
             (nodes[before].radius - nodes[n + 1].radius) /
             std::max(glm::length(nodes[n + 1].position - nodes[before].position), 1e-6f);
-        const float fraction = float(n) / float(stem.node_count - 1);
         for (int s = 0; s < sides; ++s) {
             const float angle = float(2.0 * kPi) * float(s) / float(sides);
             const Vec3 out = side * std::cos(angle) + third * std::sin(angle);
-            float radius = nodes[n].radius;
-            if (stem.level == 0 && root_flare > 0.0f) {
-                const float depth = std::max(nodes[n].position.y, 0.0f) / (3.0f * nodes[0].radius);
-                radius *= 1.0f + root_flare * std::exp(-depth) *
-                                     (1.0f + 0.35f * std::sin(3.0f * angle + 1.0f));
+            float radius = node.radius;
+            Vec3 normal = out + axis * std::clamp(slope, -1.0f, 1.0f);
+            if (stem.level == 0) {
+                const float above = std::max(node.position.y, 0.0f) / (3.0f * nodes[0].radius);
+                const float lobes = std::sin(3.0f * angle + 1.0f) + 0.6f * std::sin(5.0f * angle);
+                radius *= 1.0f + style.root_flare * std::exp(-above) * (1.0f + 0.35f * lobes);
             }
-            const Vec3 p = nodes[n].position + out * radius;
+            if (stem.level == 0 && style.relief > 0.0f && sides >= 14) {
+                // Furrows run along the trunk.
+                const DVec3 q(double(out.x) * 3.5, double(node.position.y) * 0.9,
+                              double(out.z) * 3.5);
+                const float bump = float(fractalNoise(style.seed, q, 2));
+                radius *= 1.0f + style.relief * bump;
+                const float next =
+                    float(fractalNoise(style.seed, q + DVec3(glm::cross(axis, out)) * 0.6, 2));
+                normal += glm::cross(axis, out) * ((bump - next) * style.relief * 9.0f);
+            }
+            const Vec3 p = node.position + out * radius;
             mesh.positions.push_back(p);
-            mesh.normals.push_back(glm::normalize(out + axis * std::clamp(slope, -1.0f, 1.0f)));
+            mesh.normals.push_back(glm::normalize(normal));
             mesh.colors.push_back(Vec4(color(stem, fraction, angle, p), 1.0f));
         }
     }
@@ -157,7 +180,7 @@ uint32_t branchOff(Skeleton& skeleton, Rng& rng, uint32_t parent, float fraction
                     stem.level + 1);
 }
 
-void appendTubes(const Skeleton& skeleton, size_t triangle_budget, float root_flare,
+void appendTubes(const Skeleton& skeleton, size_t triangle_budget, const TubeStyle& style,
                  const BarkColor& color, uint16_t material, Mesh& mesh) {
     if (skeleton.stems.empty()) return;
     std::vector<uint32_t> order(skeleton.stems.size());
@@ -171,7 +194,7 @@ void appendTubes(const Skeleton& skeleton, size_t triangle_budget, float root_fl
         const TubeShape shape = tubeShape(stem, radius(i), radius(0), triangle_budget);
         if (i != 0 && used + shape.triangles(stem) > triangle_budget) break;
         used += shape.triangles(stem);
-        appendTube(skeleton, stem, shape, root_flare, color, material, mesh);
+        appendTube(skeleton, stem, shape, style, color, material, mesh);
     }
 }
 

@@ -75,10 +75,15 @@ inline float uniform(Rng& rng, double lo, double hi) { return float(rng.uniform(
 using BarkColor =
     std::function<Vec3(const Stem&, float fraction, float angle, const Vec3& position)>;
 
+struct TubeStyle {
+    float root_flare = 0.0f;  // how much the trunk widens where it enters the ground
+    float relief = 0.0f;      // of the trunk's surface, relative to its radius
+    uint64_t seed = 0;
+};
+
 // Appends tubes with smooth normals for the thickest stems, in order, as long as they fit into
 // `triangle_budget` (the trunk always does). Rings are joined; each tube ends in a point.
-// `root_flare`: how much the trunk widens where it enters the ground.
-void appendTubes(const Skeleton& skeleton, size_t triangle_budget, float root_flare,
+void appendTubes(const Skeleton& skeleton, size_t triangle_budget, const TubeStyle& style,
                  const BarkColor& color, uint16_t material, Mesh& mesh);
 
 }  // namespace stipple

@@ -3,6 +3,7 @@
 #include <core/rng.h>
 #include <scenegraph/procedural/generators.h>
 #include <scenegraph/procedural/noise.h>
+#include <scenegraph/procedural/terrain_erosion.h>
 
 namespace stipple {
 
@@ -27,6 +28,12 @@ void check(const TerrainParams& params) {
         throw Error(ErrorCode::kInvalidArgument, "",
                     "a terrain's size, relief and feature_size must be positive and at most 1e7, "
                     "1e5 and 1e7 metres");
+    }
+    if (!(params.erosion >= 0.0 && params.erosion <= 1.0))
+        throw Error(ErrorCode::kInvalidArgument, "", "a terrain's erosion must be in 0..1");
+    if (!(params.water_level >= 0.0 && params.water_level <= 1e5)) {
+        throw Error(ErrorCode::kInvalidArgument, "",
+                    "a terrain's water_level must be in 0..100000 metres");
     }
 }
 
@@ -75,44 +82,117 @@ double rawHeight(TerrainStyle style, uint64_t key, const DVec2& p, int octaves) 
            0.5 * erodedNoise(key, warped * 1.3, octaves);
 }
 
-DVec3 groundColor(TerrainStyle style, uint64_t key, const DVec2& p, double relative_height,
-                  double slope, double hollow) {
+// What the ground of a place is like, by which its material is chosen.
+struct GroundPlace {
+    DVec2 position;
+    double relative_height = 0.0;  // 0: the lowest, 1: the highest
+    double slope = 0.0;            // radians
+    double hollow = 0.0;           // above 0: lower than around
+    double above_water = 1e9;      // metres
+};
+
+DVec3 groundColor(TerrainStyle style, uint64_t key, const GroundPlace& place) {
+    const DVec2 p = place.position;
+    const double slope = place.slope, hollow = place.hollow;
+    const double regions = fractalNoise(key + 25, p / 260.0, 3);
     const double patches = fractalNoise(key, p / 45.0, 4),
                  fine = fractalNoise(key + 50, p / 3.5, 3);
-    const DVec3 rock = DVec3(0.27, 0.25, 0.225) * (1.0 + 0.3 * fine + 0.2 * patches);
-    DVec3 color;
-    double rock_slope = radians(36.0);
-    if (style == TerrainStyle::kMeadow) {
-        color = glm::mix(DVec3(0.105, 0.165, 0.035), DVec3(0.16, 0.195, 0.055),
-                         smoothStep(-0.5, 0.5, patches + 0.5 * fine));
-        color = glm::mix(color, DVec3(0.2, 0.165, 0.085),
-                         0.75 * smoothStep(0.25, 0.6, patches - 0.6 * hollow + 0.35 * fine));
-        color = glm::mix(color, DVec3(0.07, 0.13, 0.03), 0.7 * smoothStep(0.1, 0.8, hollow));
-    } else if (style == TerrainStyle::kForestFloor) {
-        color = glm::mix(DVec3(0.1, 0.072, 0.042), DVec3(0.155, 0.11, 0.065),
+    // Strata show where rock is bare.
+    const double strata = std::sin(place.relative_height * 60.0 + 3.0 * patches + 2.0 * regions);
+    const DVec3 rock = glm::mix(DVec3(0.235, 0.22, 0.2), DVec3(0.32, 0.295, 0.26),
+                                0.5 + 0.25 * strata + 0.4 * patches) *
+                       (1.0 + 0.35 * fine);
+    const DVec3 scree = DVec3(0.27, 0.25, 0.22) * (1.0 + 0.3 * fine + 0.15 * patches);
+    DVec3 meadow = glm::mix(DVec3(0.085, 0.135, 0.03), DVec3(0.155, 0.185, 0.05),
+                            smoothStep(-0.6, 0.6, patches + 0.5 * fine + 0.6 * regions));
+    meadow =
+        glm::mix(meadow, DVec3(0.215, 0.18, 0.085),
+                 0.7 * smoothStep(0.2, 0.7, patches - 0.6 * hollow + 0.35 * fine - 0.5 * regions));
+    meadow = glm::mix(meadow, DVec3(0.06, 0.105, 0.028), 0.8 * smoothStep(0.1, 0.7, hollow));
+    DVec3 color = meadow;
+    double rock_slope = radians(38.0);
+    if (style == TerrainStyle::kForestFloor) {
+        color = glm::mix(DVec3(0.075, 0.055, 0.034), DVec3(0.125, 0.09, 0.052),
                          smoothStep(-0.4, 0.4, fine));
-        color = glm::mix(color, DVec3(0.07, 0.105, 0.03),
+        color = glm::mix(color, DVec3(0.055, 0.085, 0.025),
                          0.85 * smoothStep(-0.1, 0.35, patches + 0.6 * fine + 0.3 * hollow));
-    } else {
-        rock_slope = radians(30.0);
-        const DVec3 grass = glm::mix(DVec3(0.1, 0.125, 0.045), DVec3(0.17, 0.15, 0.075),
-                                     smoothStep(0.1, 0.5, relative_height + 0.3 * patches));
-        const DVec3 scree = DVec3(0.24, 0.225, 0.2) * (1.0 + 0.25 * fine);
-        color = glm::mix(grass, scree,
-                         smoothStep(0.35, 0.55, relative_height + 0.2 * patches - 0.15 * hollow));
+    } else if (style == TerrainStyle::kMountain) {
+        rock_slope = radians(41.0);
+        const double high = place.relative_height + 0.12 * regions + 0.1 * patches;
+        color = glm::mix(meadow, DVec3(0.15, 0.135, 0.065), smoothStep(0.15, 0.4, high));
+        color = glm::mix(color, scree, smoothStep(0.38, 0.56, high - 0.15 * hollow));
     }
     color *= 1.0 + 0.22 * fine + 0.12 * patches;
+    // Loose stones lie below the cliffs, where it is steep but not bare.
+    color = glm::mix(color, scree,
+                     0.8 * smoothStep(rock_slope - 0.26, rock_slope - 0.04,
+                                      slope + 0.16 * patches + 0.12 * fine + 0.1 * hollow));
     color = glm::mix(
         color, rock,
-        smoothStep(rock_slope - 0.12, rock_slope + 0.12, slope + 0.12 * patches + 0.1 * fine));
+        smoothStep(rock_slope - 0.1, rock_slope + 0.1, slope + 0.12 * patches + 0.1 * fine));
     if (style == TerrainStyle::kMountain) {
         // Snow lies high up and where it is not too steep, deeper in hollows.
         const double snow =
-            smoothStep(0.56, 0.68, relative_height + 0.1 * patches + 0.05 * fine + 0.12 * hollow) *
+            smoothStep(0.56, 0.68,
+                       place.relative_height + 0.1 * patches + 0.05 * fine + 0.12 * hollow) *
             smoothStep(radians(58.0), radians(44.0), slope + 0.1 * fine);
         color = glm::mix(color, DVec3(0.84, 0.87, 0.91), snow);
     }
-    return color * (1.0 - 0.25 * std::clamp(hollow, -0.4, 1.0));
+    color *= 1.0 - 0.25 * std::clamp(hollow, -0.4, 1.0);
+    // A shore of sand and gravel, dark where it is wet.
+    const double shore = place.above_water + 0.8 * fine + 0.9 * patches;
+    const DVec3 sand = DVec3(0.29, 0.25, 0.18) * (1.0 + 0.3 * fine);
+    color = glm::mix(color, sand, smoothStep(2.4, 0.7, shore));
+    return color * (1.0 - 0.5 * smoothStep(0.5, 0.05, place.above_water));
+}
+
+// Shores are flatter than hills. Monotone.
+double flattenShore(double above_water) {
+    return above_water * (0.3 + 0.7 * smoothStep(0.0, 9.0, std::abs(above_water)));
+}
+
+// Over every cell that reaches below the water: flat, its colour by the depth beneath it, its
+// normals moved a little by waves.
+void appendWater(const HeightField& field, double level, uint64_t key, GeneratedMesh& terrain) {
+    Mesh& mesh = terrain.mesh;
+    const size_t n = size_t(field.columns), rows = size_t(field.rows);
+    const DVec2 step = field.size / DVec2(double(n - 1), double(rows - 1));
+    std::vector<uint32_t> vertices(n * rows, UINT32_MAX);
+    const auto vertexAt = [&](size_t i, size_t j) {
+        uint32_t& v = vertices[j * n + i];
+        if (v != UINT32_MAX) return v;
+        v = uint32_t(mesh.positions.size());
+        const DVec2 p = DVec2(double(i), double(j)) * step - 0.5 * field.size;
+        const double depth = level - double(field.heights[j * n + i]);
+        const double wind = fractalNoise(key, p / 160.0, 3);
+        const DVec3 shallow(0.055, 0.06, 0.04), deep(0.01, 0.024, 0.03);
+        const DVec3 color = glm::mix(shallow, deep, smoothStep(-0.2, 3.5, depth + 0.5 * wind));
+        const double roughness = 0.02 + 0.02 * smoothStep(-0.3, 0.4, wind);
+        const DVec3 normal(roughness * fractalNoise(key + 10, p / 14.0, 2), 1.0,
+                           roughness * fractalNoise(key + 20, p / 14.0, 2));
+        mesh.positions.push_back(Vec3(DVec3(p.x, level, p.y)));
+        mesh.normals.push_back(Vec3(glm::normalize(normal)));
+        mesh.colors.push_back(Vec4(Vec3(color) * float(1.0 + 0.25 * wind), 1.0f));
+        return v;
+    };
+    for (size_t j = 0; j + 1 < rows; ++j) {
+        for (size_t i = 0; i + 1 < n; ++i) {
+            const float* row = field.heights.data() + j * n + i;
+            if (std::min({row[0], row[1], row[n], row[n + 1]}) >= float(level)) continue;
+            const uint32_t a = vertexAt(i, j), b = vertexAt(i + 1, j), c = vertexAt(i, j + 1),
+                           d = vertexAt(i + 1, j + 1);
+            mesh.triangles.push_back(UVec3(a, c, b));
+            mesh.triangles.push_back(UVec3(b, c, d));
+        }
+    }
+    mesh.triangle_material.resize(mesh.triangles.size(), 1);
+    Material water;
+    water.name = "water";
+    water.base_color = Vec3(1.0f);
+    water.specular = Vec3(0.05f);
+    water.shininess = 90.0f;
+    water.emissive = Vec3(0.1f, 0.145f, 0.2f);  // the sky it mirrors
+    terrain.materials.push_back(water);
 }
 
 // A height field by samples; beyond the border the border's.
@@ -167,6 +247,8 @@ Vec3 HeightField::normal(double x, double z) const {
     return Vec3(glm::normalize(DVec3(-dx, 1.0, -dz)));
 }
 
+std::vector<std::string> terrainStyles() { return {"meadow", "forest_floor", "mountain"}; }
+
 HeightField makeHeightField(const TerrainParams& params) {
     check(params);
     const TerrainStyle style = terrainStyle(params.style);
@@ -191,7 +273,27 @@ HeightField makeHeightField(const TerrainParams& params) {
         }
     }
     const float scale = high > low ? float(params.relief) / (high - low) : 0.0f;
-    for (float& h : field.heights) h = (h - low) * scale;
+    for (float& h : field.heights) {
+        h = (h - low) * scale;
+        // Mountains rise from wide valleys.
+        if (style == TerrainStyle::kMountain && scale > 0.0f)
+            h = float(params.relief) * std::pow(h / float(params.relief), 1.8f);
+    }
+    const double water = params.water_level;
+    if (params.erosion > 0.0 && scale > 0.0f) {
+        erode(field, params.erosion, water, params.seed);
+        // Back to the relief asked for; what lies under water is as it was.
+        const auto [least, most] = std::minmax_element(field.heights.begin(), field.heights.end());
+        const double base = water > 0.0 ? water : double(*least);
+        const double stretch = (params.relief - std::max(water, 0.0)) / (double(*most) - base);
+        for (float& h : field.heights) {
+            if (stretch > 0.0 && double(h) >= base)
+                h = float(params.relief - (double(*most) - double(h)) * stretch);
+        }
+    }
+    if (water > 0.0) {
+        for (float& h : field.heights) h = float(water + flattenShore(double(h) - water));
+    }
     return field;
 }
 
@@ -245,8 +347,10 @@ GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field)
                         sample.height(i, j - reach) + sample.height(i, j + reach));
             const double hollow = 4.0 * (around - p.y) / (reach * step);
             const double relative_height = relief > 0.0 ? (p.y - low) / relief : 0.0;
-            const DVec3 color = groundColor(style, key, DVec2(p.x, p.z), relative_height,
-                                            std::acos(std::min(normal.y, 1.0)), hollow);
+            GroundPlace place{DVec2(p.x, p.z), relative_height, std::acos(std::min(normal.y, 1.0)),
+                              hollow};
+            if (params.water_level > 0.0) place.above_water = p.y - params.water_level;
+            const DVec3 color = groundColor(style, key, place);
             mesh.colors.push_back(Vec4(Vec3(glm::clamp(color, DVec3(0.0), DVec3(1.0))), 1.0f));
         }
     }
@@ -254,6 +358,8 @@ GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field)
     material.name = "ground";
     material.base_color = Vec3(1.0f);
     result.materials.push_back(material);
+    if (params.water_level > 0.0)
+        appendWater(field, params.water_level, hashCombine(params.seed, 0x7e46), result);
     return result;
 }
 

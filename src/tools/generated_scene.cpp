@@ -56,6 +56,7 @@ std::string forestSceneJson(const GeneratedSceneParams& params) {
     ground.relief = std::min(60.0, 0.08 * size);
     ground.feature_size = std::min(400.0, size);
     ground.style = "forest_floor";
+    ground.erosion = 0.4;
     const HeightField field = makeHeightField(ground);
 
     Json scene = {{"version", 1}};
@@ -64,10 +65,11 @@ std::string forestSceneJson(const GeneratedSceneParams& params) {
     scene["assets"]["ground"] = {{"generate", "terrain"},   {"seed", ground.seed},
                                  {"size", ground.size},     {"resolution", ground.resolution},
                                  {"relief", ground.relief}, {"feature_size", ground.feature_size},
-                                 {"style", ground.style}};
-    const Json items = {item("oak_1", 2),   item("oak_2", 2),    item("birch_1", 1),
-                        item("birch_2", 1), item("spruce_1", 3), item("spruce_2", 3),
-                        item("pine_1", 1),  item("pine_2", 1),   item("rock", 0.5)};
+                                 {"style", ground.style},   {"erosion", ground.erosion}};
+    const Json items = {item("oak_1", 2),    item("oak_2", 2),    item("beech_1", 2),
+                        item("beech_2", 2),  item("birch_1", 1),  item("birch_2", 1),
+                        item("spruce_1", 3), item("spruce_2", 3), item("pine_1", 1),
+                        item("pine_2", 1),   item("rock", 0.5)};
     scene["groups"]["forest"] = {{"instances", {{{"child", "ground"}}}},
                                  {"scatter",
                                   {{"on", "ground"},

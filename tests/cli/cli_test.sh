@@ -365,7 +365,7 @@ case_compare() {
 }
 
 case_generate() {
-    for kind in tree grass rock terrain; do
+    for kind in tree bush deadwood grass fern flowers litter rock terrain; do
         expect_ok generate $kind -o $kind.glb
         [[ $(cat stdout.txt) == $kind.glb ]] || fail "stdout is not the path"
         expect_ok info $kind.glb
@@ -383,6 +383,13 @@ case_generate() {
     expect_error 2 '\.glb' generate tree -o a.obj
     expect_error 2 '\.scene\.json' generate forest -o a.json
     expect_error 2 '1000\.\.2000000' generate tree --count 3 -o a.glb
+    expect_ok generate tree --species birch --season winter -o winter.glb
+    expect_ok generate deadwood --species log --size 5 -o log.glb
+    expect_error 2 'oak, beech, birch, spruce or pine' generate tree --species palm -o a.glb
+    expect_error 2 'spring, summer, autumn or winter' generate tree --season monsoon -o a.glb
+    expect_error 2 '--season' generate rock --season winter -o a.glb
+    expect_error 2 '--species' generate fern --species oak -o a.glb
+    expect_no_file a.glb
 }
 
 declare -F "case_$3" >/dev/null || fail "there is no case $3"

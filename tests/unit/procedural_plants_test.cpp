@@ -7,6 +7,7 @@
 
 #include <cstring>
 #include <numeric>
+#include <utility>
 
 namespace stipple {
 namespace {
@@ -146,6 +147,109 @@ TEST(ProceduralTree, crownsAreDarkerInside) {
     ASSERT_GT(count[0], 50.0);
     ASSERT_GT(count[1], 50.0);
     EXPECT_LT(sum[0] / count[0], 0.75 * sum[1] / count[1]);
+}
+
+// Mean linear colour of the triangles of a material, and their number.
+std::pair<Vec3, size_t> meanColor(const GeneratedMesh& g, const std::string& material) {
+    Vec3 sum(0.0f);
+    size_t count = 0;
+    for (size_t i = 0; i < g.mesh.triangles.size(); ++i) {
+        const Material& m = g.materials[g.mesh.triangle_material[i]];
+        if (m.name != material) continue;
+        sum += m.base_color * Vec3(g.mesh.colors[g.mesh.triangles[i].y]);
+        ++count;
+    }
+    return {count ? sum / float(count) : sum, count};
+}
+
+TEST(ProceduralTree, seasonsChangeColourAndAmountOfLeaves) {
+    for (const char* species : {"oak", "beech", "birch"}) {
+        SCOPED_TRACE(species);
+        const auto leaves = [&](const char* season) {
+            const GeneratedMesh tree =
+                makeTree({.species = species, .triangles = 8000, .season = season});
+            expectSane(tree);
+            EXPECT_NEAR(double(tree.mesh.triangles.size()), 8000.0, 800.0) << season;
+            return meanColor(tree, "leaves");
+        };
+        const auto [summer, n_summer] = leaves("summer");
+        const auto [autumn, n_autumn] = leaves("autumn");
+        EXPECT_GT(summer.y, summer.x);  // green
+        EXPECT_GT(autumn.x, autumn.y);  // yellow to red
+        EXPECT_LT(n_autumn, n_summer);
+        EXPECT_LT(leaves("spring").second, n_summer);
+        EXPECT_LT(leaves("winter").second, n_summer / 10);
+    }
+    const auto needles = [](const char* season) {
+        return meanColor(makeTree({.species = "spruce", .triangles = 8000, .season = season}),
+                         "needles")
+            .second;
+    };
+    EXPECT_EQ(needles("winter"), needles("summer"));
+    EXPECT_THROW(makeTree({.season = "monsoon"}), Error);
+}
+
+TEST(ProceduralBush, hasTheWantedTrianglesAndHeight) {
+    for (const std::string& species : bushSpecies()) {
+        for (const int triangles : {2000, 6000, 50000}) {
+            SCOPED_TRACE(species + " " + std::to_string(triangles));
+            const GeneratedMesh bush =
+                makeBush({.species = species, .seed = 4, .height = 1.5, .triangles = triangles});
+            expectSane(bush);
+            EXPECT_NEAR(double(bush.mesh.triangles.size()), triangles, 0.1 * triangles);
+            EXPECT_NEAR(boundsOf(bush.mesh).max.y, 1.5f, 1e-4f);
+            EXPECT_GT(boundsOf(bush.mesh).min.y, -0.4f);
+        }
+    }
+    EXPECT_THROW(makeBush({.species = "oak"}), Error);
+    EXPECT_THROW(makeBush({.triangles = 10}), Error);
+}
+
+TEST(ProceduralDeadwood, liesOrStandsOnTheGround) {
+    for (const std::string& form : deadwoodForms()) {
+        for (const int triangles : {500, 4000, 40000}) {
+            SCOPED_TRACE(form + " " + std::to_string(triangles));
+            const GeneratedMesh wood =
+                makeDeadwood({.form = form, .seed = 2, .length = 5.0, .triangles = triangles});
+            expectSane(wood);
+            EXPECT_LE(wood.mesh.triangles.size(), size_t(1.1 * triangles) + 200);
+            const Box3 box = boundsOf(wood.mesh);
+            const float length = form == "log" ? box.extent().x : box.max.y;
+            EXPECT_NEAR(length, 5.0f, 0.6f);
+            EXPECT_LT(box.min.y, 0.02f);
+            EXPECT_GT(box.min.y, -1.5f);
+        }
+    }
+    EXPECT_THROW(makeDeadwood({.form = "ash"}), Error);
+    EXPECT_THROW(makeDeadwood({.length = -1.0}), Error);
+    EXPECT_THROW(makeDeadwood({.triangles = 0}), Error);
+}
+
+TEST(ProceduralUndergrowth, staysWithinItsSizeAndCounts) {
+    const GeneratedMesh fern = makeFern({.seed = 3, .height = 0.9, .fronds = 9});
+    expectSane(fern);
+    EXPECT_EQ(fern.mesh.triangles.size(), 9u * 73u);
+    EXPECT_NEAR(boundsOf(fern.mesh).max.y, 0.9f, 1e-4f);
+    const GeneratedMesh litter = makeLitter({.seed = 3, .radius = 2.0, .leaves = 500});
+    expectSane(litter);
+    EXPECT_LE(litter.mesh.triangles.size(), 1000u);
+    EXPECT_GT(litter.mesh.triangles.size(), 900u);
+    EXPECT_LT(boundsOf(litter.mesh).max.x, 2.7f);
+    for (const std::string& species : flowerSpecies()) {
+        SCOPED_TRACE(species);
+        const GeneratedMesh flowers =
+            makeFlowers({.species = species, .height = 0.5, .radius = 1.0, .stems = 20});
+        expectSane(flowers);
+        EXPECT_NEAR(boundsOf(flowers.mesh).max.y, 0.5f, 0.12f);
+        EXPECT_LT(boundsOf(flowers.mesh).max.x, 1.5f);
+        EXPECT_LE(flowers.mesh.triangles.size(), 20u * 70u);
+    }
+    EXPECT_THROW(makeFern({.fronds = 0}), Error);
+    EXPECT_THROW(makeFern({.height = std::nan("")}), Error);
+    EXPECT_THROW(makeLitter({.leaves = -1}), Error);
+    EXPECT_THROW(makeLitter({.season = "never"}), Error);
+    EXPECT_THROW(makeFlowers({.species = "nettle"}), Error);
+    EXPECT_THROW(makeFlowers({.radius = -1.0}), Error);
 }
 
 TEST(ProceduralTree, refusesNonsense) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <scenegraph/procedural/generators.h>
 #include <scenegraph/procedural/noise.h>
+#include <algorithm>
 
 namespace stipple {
 namespace {
@@ -107,7 +108,71 @@ TEST(ProceduralTerrain, mountainsHaveSnowAboveAndNotBelow) {
     EXPECT_EQ(white_below, 0u);
 }
 
+TEST(ProceduralTerrain, erosionCutsValleysThatDrain) {
+    TerrainParams params{.seed = 6, .size = 2000.0, .resolution = 129, .relief = 300.0};
+    // Places lower than all eight around, but for the border: hollows.
+    const auto hollows = [](const HeightField& f) {
+        int count = 0;
+        for (int j = 1; j + 1 < f.resolution; ++j) {
+            for (int i = 1; i + 1 < f.resolution; ++i) {
+                const float* h = f.heights.data() + j * f.resolution + i;
+                bool lowest = true;
+                for (int d = 0; d < 9; ++d) {
+                    if (d != 4 && h[(d / 3 - 1) * f.resolution + d % 3 - 1] <= *h) lowest = false;
+                }
+                count += lowest;
+            }
+        }
+        return count;
+    };
+    const HeightField before = makeHeightField(params);
+    params.erosion = 1.0;
+    const HeightField after = makeHeightField(params);
+    EXPECT_LT(hollows(after), hollows(before));
+    EXPECT_NE(before.heights, after.heights);
+    EXPECT_EQ(after.heights, makeHeightField(params).heights);
+    const auto [low, high] = std::minmax_element(after.heights.begin(), after.heights.end());
+    EXPECT_NEAR(*low, 0.0f, 1e-3f);
+    EXPECT_NEAR(*high, 300.0f, 1e-2f);
+}
+
+TEST(ProceduralTerrain, waterCoversWhatIsBelowIt) {
+    const TerrainParams params{.seed = 2,
+                               .size = 1000.0,
+                               .resolution = 65,
+                               .relief = 100.0,
+                               .erosion = 0.5,
+                               .water_level = 30.0};
+    const HeightField field = makeHeightField(params);
+    const GeneratedMesh terrain = makeTerrain(params, field);
+    ASSERT_EQ(terrain.materials.size(), 2u);
+    EXPECT_EQ(terrain.materials[1].name, "water");
+    size_t wet = 0, covered = 0;
+    for (int j = 0; j + 1 < 65; ++j) {
+        for (int i = 0; i + 1 < 65; ++i) {
+            const float* h = field.heights.data() + j * 65 + i;
+            wet += std::min({h[0], h[1], h[65], h[66]}) < 30.0f;
+        }
+    }
+    for (size_t t = 0; t < terrain.mesh.triangles.size(); ++t) {
+        if (terrain.mesh.triangle_material[t] != 1) continue;
+        ++covered;
+        for (int c = 0; c < 3; ++c)
+            EXPECT_EQ(terrain.mesh.positions[terrain.mesh.triangles[t][c]].y, 30.0f);
+    }
+    EXPECT_GT(wet, 50u);
+    EXPECT_EQ(covered, 2 * wet);
+    EXPECT_EQ(makeTerrain({.water_level = 0.0}, makeHeightField({})).materials.size(), 1u);
+}
+
 TEST(ProceduralTerrain, flatReliefStaysFinite) {
+    for (const char* style : {"meadow", "mountain"}) {
+        const TerrainParams flooded{
+            .resolution = 33, .relief = 20.0, .style = style, .erosion = 1.0, .water_level = 50.0};
+        for (const float h : makeHeightField(flooded).heights) EXPECT_TRUE(h >= 0.0f && h <= 20.0f);
+        const TerrainParams even{.resolution = 33, .relief = 0.0, .style = style, .erosion = 1.0};
+        for (const float h : makeHeightField(even).heights) EXPECT_EQ(h, 0.0f);
+    }
     const TerrainParams params{.resolution = 2, .relief = 0.0};
     const HeightField field = makeHeightField(params);
     for (const float h : field.heights) EXPECT_EQ(h, 0.0f);
@@ -121,6 +186,8 @@ TEST(ProceduralTerrain, refusesNonsense) {
     EXPECT_THROW(makeHeightField({.size = -5.0}), Error);
     EXPECT_THROW(makeHeightField({.relief = std::nan("")}), Error);
     EXPECT_THROW(makeHeightField({.style = "moon"}), Error);
+    EXPECT_THROW(makeHeightField({.erosion = 2.0}), Error);
+    EXPECT_THROW(makeHeightField({.water_level = -1.0}), Error);
 }
 
 }  // namespace
