@@ -14,4 +14,9 @@ namespace stipple {
 Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budget,
                              const std::string& where);
 
+// Reads the picture file into a new texture of the scene, with mip levels, and returns its
+// index. is_opaque: its alpha has no meaning. Throws as above, and as readFile().
+int addTexture(Scene& scene, const std::filesystem::path& file, bool is_srgb, bool is_opaque,
+               LoadContext& context, const std::string& where);
+
 }  // namespace stipple

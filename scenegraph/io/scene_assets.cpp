@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <scenegraph/io/gltf.h>
+#include <scenegraph/io/model.h>
 #include <scenegraph/io/scene_reader.h>
-
-#include <limits>
 
 namespace stipple {
 
@@ -14,18 +12,16 @@ ChildRef loadFile(SceneReader& reader, const Json& asset, const JsonPath& path) 
     const std::string& file = asset["file"].get_ref<const std::string&>();
     const std::filesystem::path full =
         resolvePath(reader.context, reader.folder, file, reader.where(file_path));
-    std::string extension = full.extension().string();
-    for (char& c : extension) c = char(std::tolower(uint8_t(c)));
-    if (extension != ".gltf" && extension != ".glb") {
+    if (!isModelFile(full)) {
         throw Error(ErrorCode::kUnsupported, reader.where(file_path),
-                    inQuotes(file) + " is neither .gltf nor .glb");
+                    inQuotes(file) + " is no model (" + kModelExtensions + ")");
     }
     if (const auto it = reader.files.find(full.string()); it != reader.files.end())
         return it->second;
     // Cameras and lights of an asset that stands in many places mean nothing.
     const size_t n_cameras = reader.scene.cameras.size(),
                  n_suns = reader.scene.lighting.suns.size();
-    const ChildRef child = loadGltf(full, file, reader.scene, reader.context);
+    const ChildRef child = loadModel(full, file, reader.scene, reader.context);
     reader.scene.cameras.resize(n_cameras);
     reader.scene.lighting.suns.resize(n_suns);
     return reader.files[full.string()] = child;
@@ -90,18 +86,9 @@ GeneratedMesh generate(SceneReader& reader, const std::string& name, const Json&
 
 ChildRef addGenerated(SceneReader& reader, const std::string& name, GeneratedMesh generated,
                       const JsonPath& path) {
-    Scene& scene = reader.scene;
-    const size_t first = scene.materials.size();
-    if (first + generated.materials.size() > size_t(std::numeric_limits<uint16_t>::max()) + 1) {
-        throw Error(ErrorCode::kUnsupported, reader.where(path),
-                    "the scene has more than 65536 materials");
-    }
-    for (uint16_t& material : generated.mesh.triangle_material)
-        material = uint16_t(material + first);
-    for (Material& material : generated.materials) scene.materials.push_back(std::move(material));
     generated.mesh.name = oneLine(name);
-    scene.meshes.push_back(std::move(generated.mesh));
-    return ChildRef::mesh(uint32_t(scene.meshes.size() - 1));
+    return addModel(reader.scene, std::move(generated.mesh), std::move(generated.materials),
+                    reader.where(path));
 }
 
 }  // namespace
