@@ -4,6 +4,7 @@
 #include <scenegraph/io/gltf.h>
 
 #include <scenegraph/io/gltf_mesh.h>
+#include <scenegraph/io/model.h>
 #include <scenegraph/io/transform.h>
 
 #include <algorithm>
@@ -365,8 +366,7 @@ ChildRef loadGltf(const std::filesystem::path& path, const std::string& name, Sc
     context.throwIfCancelled();
     const GltfDocument document = openGltf(path, name, context);
     const std::vector<Placement> placements = NodeWalk(document, scene).run();
-    if (placements.empty())
-        throw Error(ErrorCode::kInvalidScene, document.name, "its scene shows no triangles");
+    if (placements.empty()) return addEmptyGroup(scene, document.name);
 
     const Affine& first = placements[0].group_from_child;
     if (placements.size() == 1 && first.linear == DMat3(1.0) && first.translation == DVec3(0.0))

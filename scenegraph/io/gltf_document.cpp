@@ -3,6 +3,9 @@
 // why: tinygltf only turns JSON into structs here. It would read files outside of the folder, take
 // other lengths than the specification allows for wrong, drop what has a wrong type without a word,
 // and read beyond the end of a cut-off .glb.
+// why: compiled in here, as Draco's library exports an older tinygltf of its own, which would take
+// the place of a shared one.
+#define TINYGLTF_IMPLEMENTATION
 #include <scenegraph/io/gltf_document.h>
 
 #include <scenegraph/io/gltf_compression.h>
@@ -214,6 +217,27 @@ Json takeArray(Json& root, const char* key) {
     return array;
 }
 
+// Takes the indices out of all primitives: tinygltf refuses those without a buffer view, which
+// compressed ones have not.
+std::vector<int> takeIndices(Json& root) {
+    std::vector<int> indices;
+    if (!root.contains("meshes")) return indices;
+    for (Json& mesh : root["meshes"]) {
+        for (Json& primitive : mesh["primitives"]) {
+            indices.push_back(primitive.value("indices", -1));
+            primitive.erase("indices");
+        }
+    }
+    return indices;
+}
+
+void putIndices(const std::vector<int>& indices, tinygltf::Model& model) {
+    size_t i = 0;
+    for (tinygltf::Mesh& mesh : model.meshes) {
+        for (tinygltf::Primitive& primitive : mesh.primitives) primitive.indices = indices.at(i++);
+    }
+}
+
 }  // namespace
 
 void GltfDocument::fail(ErrorCode code, const std::string& path, const std::string& message) const {
@@ -253,6 +277,7 @@ GltfDocument openGltf(const std::filesystem::path& path, const std::string& name
         document.images.push_back({image.value("uri", ""), image.value("bufferView", -1)});
     }
     for (const char* unused : {"animations", "extras"}) root.erase(unused);
+    const std::vector<int> indices = takeIndices(root);
     const std::string stripped = root.dump();
     root = Json();
     if (stripped.size() > std::numeric_limits<unsigned>::max()) {
@@ -264,6 +289,7 @@ GltfDocument openGltf(const std::filesystem::path& path, const std::string& name
                                     unsigned(stripped.size()), "")) {
         throw Error(ErrorCode::kInvalidScene, document.name, oneLine(error));
     }
+    putIndices(indices, document.model);
     loadBuffers(document, buffers, container);
     decodeMeshoptViews(document);
     return document;

@@ -141,9 +141,13 @@ Material GltfMaterials::convert(const tinygltf::Material& source, bool for_point
         roughness *= texel.g;
         metallic *= texel.b;
     }
-    // Metallic-roughness as diffuse and a Phong lobe: a metal has no diffuse part and mirrors in
-    // its colour; a microfacet lobe of width alpha = roughness^2 is about as wide as a Phong lobe
-    // of exponent 2 / alpha^2 - 2. Of what is mirrored, the textures' means count.
+    // Metallic-roughness as diffuse and a Phong lobe: a metal mirrors in its colour. What it
+    // mirrors of its surroundings is not drawn, but the rougher it is the more that looks like
+    // scattered light, and is counted as such. A microfacet lobe of width alpha = roughness^2 is
+    // about as wide as a Phong lobe of exponent 2 / alpha^2 - 2. Of what is mirrored, the textures'
+    // means count.
+    const float smooth = 1.0f - roughness * roughness;
+    metallic *= smooth, m.metallic *= smooth;
     if (m.metallic_map.texture == kNoTexture) m.base_color *= 1.0f - metallic;
     m.specular = glm::mix(dielectricSpecular(source, path), mean_base, metallic);
     const float r4 = roughness * roughness * roughness * roughness;

@@ -47,12 +47,7 @@ Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool&
         context.throwIfCancelled();
         buildScene(scene, pool);
         const DBox3 bounds = sceneBounds(scene);
-        if (bounds.isEmpty()) {
-            if (is_asset)
-                throw Error(ErrorCode::kInvalidScene, oneLine(path, 300),
-                            "all its triangles have no area");
-            diagnostics.warn(oneLine(path, 300), "the scene is empty");
-        }
+        if (bounds.isEmpty()) diagnostics.warn(oneLine(path, 300), "the scene is empty");
         // Single assets always have a camera of that name, before their own.
         if (scene.cameras.empty() || is_asset) {
             Camera camera = bounds.isEmpty() ? Camera() : cameraForBounds(bounds);

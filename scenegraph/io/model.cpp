@@ -33,10 +33,16 @@ ChildRef loadModel(const std::filesystem::path& path, const std::string& name, S
     return loadGltf(path, name, scene, context);
 }
 
+ChildRef addEmptyGroup(Scene& scene, const std::string& name) {
+    Group group;
+    group.name = name;
+    scene.groups.push_back(std::move(group));
+    return ChildRef::group(uint32_t(scene.groups.size() - 1));
+}
+
 ChildRef addModel(Scene& scene, Mesh mesh, std::vector<Material> materials,
                   const std::string& where) {
-    if (mesh.triangles.empty())
-        throw Error(ErrorCode::kInvalidScene, where, "shows no triangles and no points");
+    if (mesh.triangles.empty()) return addEmptyGroup(scene, mesh.name);
     const size_t first = scene.materials.size();
     if (first + materials.size() > size_t(std::numeric_limits<uint16_t>::max()) + 1) {
         throw Error(ErrorCode::kUnsupported, where, "the scene has more than 65536 materials");

@@ -28,8 +28,11 @@ ChildRef loadPly(const std::filesystem::path& path, const std::string& name, Sce
 ChildRef loadObj(const std::filesystem::path& path, const std::string& name, Scene& scene,
                  LoadContext& context);
 
-// Adds mesh and materials; triangle_material counts from the first of `materials`. Throws
-// kUnsupported for more than 65536 materials, kInvalidScene for a mesh without triangles.
+// A group that shows nothing.
+ChildRef addEmptyGroup(Scene& scene, const std::string& name);
+
+// Adds mesh and materials; triangle_material counts from the first of `materials`. A mesh without
+// triangles becomes an empty group. Throws kUnsupported for more than 65536 materials.
 ChildRef addModel(Scene& scene, Mesh mesh, std::vector<Material> materials,
                   const std::string& where);
 

@@ -30,9 +30,9 @@ Vec3 linearColor(const Vec3& srgb) {
 // Loads the textures of one MTL file.
 class MtlTextures {
 public:
-    MtlTextures(const std::filesystem::path& folder, Scene& scene, LoadContext& context,
+    MtlTextures(std::filesystem::path folder, Scene& scene, LoadContext& context,
                 const std::string& where)
-        : folder_(folder), scene_(scene), context_(context), where_(where) {}
+        : folder_(std::move(folder)), scene_(scene), context_(context), where_(where) {}
 
     // The texture of one picture; kNoTexture, with a warning, if it cannot be had.
     int load(const std::string& name, const tinyobj::texture_option_t& options, bool is_srgb,
@@ -101,7 +101,7 @@ private:
         }
     }
 
-    const std::filesystem::path& folder_;
+    std::filesystem::path folder_;
     Scene& scene_;
     LoadContext& context_;
     const std::string& where_;
