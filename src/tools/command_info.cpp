@@ -126,7 +126,9 @@ ExitCode runInfo(const std::vector<std::string>& arguments) {
     std::string path;
     LoadOptions load_options;
     bool as_json = false;
-    app.add_option("SCENE", path, "*.scene.json, .gltf or .glb")->required()->group("Arguments");
+    app.add_option("SCENE", path, "*.scene.json, .gltf, .glb, .ply or .obj")
+        ->required()
+        ->group("Arguments");
     app.add_flag("--json", as_json, "print JSON");
     app.add_flag("--allow-outside", load_options.allow_outside,
                  "let the scene's paths leave its folder");
