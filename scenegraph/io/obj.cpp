@@ -299,11 +299,14 @@ ChildRef loadObj(const std::filesystem::path& path, const std::string& name, Sce
     const std::filesystem::path folder = folderOf(path.string());
     ObjContents contents = ObjParser(text, folder, scene, context, where).parse();
 
+    if (contents.positions.empty())
+        throw Error(ErrorCode::kParse, where, "has no vertices: not an OBJ file");
+
     Mesh mesh;
     mesh.name = oneLine(path.stem().string());
     if (!contents.faces.empty()) {
         addFaces(contents, mesh);
-    } else if (!contents.positions.empty()) {
+    } else {
         const bool has_normals = contents.normals.size() == contents.positions.size();
         const PointDiscs discs =
             makePointDiscs(contents.positions, has_normals ? contents.normals : std::vector<Vec3>(),

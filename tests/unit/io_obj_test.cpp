@@ -82,6 +82,7 @@ TEST(IoObj, namesTheLineOfWhatIsWrong) {
               "t.obj: line 5: index 0, but there are 4 vertices so far");
     EXPECT_EQ(errorOf(kSquare + "f -5 1 2\n"),
               "t.obj: line 5: index -5, but there are 4 vertices so far");
+    EXPECT_EQ(errorOf("x\n"), "t.obj: has no vertices: not an OBJ file");
     EXPECT_EQ(errorOf("v 0 0\n"), "t.obj: line 1: a number is missing");
     EXPECT_EQ(errorOf("v 0 zero 0\n"), "t.obj: line 1: \"zero\" is no number");
     EXPECT_EQ(errorOf("v 0 nan 0\n"), "t.obj: line 1: \"nan\" is beyond 1e15 or not finite");
