@@ -45,9 +45,12 @@ struct Mesh {
 
     // What loaders and generators fill. Per-vertex arrays are either empty or as long as
     // `positions`.
-    std::vector<Vec3> positions;  // object space, metres
-    std::vector<Vec3> normals;    // unit; empty: flat shading
-    std::vector<Vec2> uvs;        // glTF convention
+    std::vector<Vec3> positions;              // object space, metres
+    std::vector<Vec3> normals;                // unit; empty: flat shading
+    std::vector<Vec2> uvs;                    // glTF convention
+    std::vector<std::vector<Vec2>> more_uvs;  // further layers (TextureUse::uv_layer)
+    // w: +-1, bitangent = w * cross(normal, tangent); null vectors or empty: derived from the uvs.
+    std::vector<Vec4> tangents;
     std::vector<Vec4> colors;  // linear RGBA, multiplied with the material's colour; empty: white
     std::vector<UVec3> triangles;             // counter-clockwise seen from the front
     std::vector<uint16_t> triangle_material;  // index into Scene::materials, one a triangle

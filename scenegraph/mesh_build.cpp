@@ -6,6 +6,7 @@
 #include <core/material.h>
 #include <scenegraph/morton.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <numeric>
@@ -26,6 +27,9 @@ void checkArrays(const Mesh& mesh, size_t n_materials, const std::string& where)
     if ((!mesh.normals.empty() && mesh.normals.size() != n) ||
         (!mesh.uvs.empty() && mesh.uvs.size() != n) ||
         (!mesh.colors.empty() && mesh.colors.size() != n) ||
+        (!mesh.tangents.empty() && mesh.tangents.size() != n) ||
+        std::any_of(mesh.more_uvs.begin(), mesh.more_uvs.end(),
+                    [&](const auto& layer) { return !layer.empty() && layer.size() != n; }) ||
         mesh.triangle_material.size() != mesh.triangles.size()) {
         throw sceneError(where, "vertex arrays differ in length");
     }
@@ -363,8 +367,11 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
 }
 
 size_t Mesh::bytes() const {
-    return positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) +
-           uvs.size() * sizeof(Vec2) + colors.size() * sizeof(Vec4) +
+    size_t more_uv_bytes = 0;
+    for (const auto& layer : more_uvs) more_uv_bytes += layer.size() * sizeof(Vec2);
+    return more_uv_bytes + tangents.size() * sizeof(Vec4) + positions.size() * sizeof(Vec3) +
+           normals.size() * sizeof(Vec3) + uvs.size() * sizeof(Vec2) +
+           colors.size() * sizeof(Vec4) +
            triangles.size() * (sizeof(UVec3) + sizeof(uint16_t) + sizeof(uint8_t)) +
            nodes.size() * sizeof(MeshNode) + cumulative_area.size() * sizeof(double);
 }

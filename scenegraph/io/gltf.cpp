@@ -5,11 +5,14 @@
 
 #include <scenegraph/io/gltf_lights.h>
 #include <scenegraph/io/gltf_mesh.h>
+#include <scenegraph/io/model.h>
 #include <scenegraph/io/transform.h>
 
 #include <algorithm>
 #include <array>
 #include <map>
+#include <optional>
+#include <tuple>
 
 namespace stipple {
 
@@ -37,6 +40,11 @@ private:
     void visit(int node, const Affine& world_from_node);
     void placeMesh(const tinygltf::Node& node, const Affine& world_from_node,
                    const std::string& path);
+    void placeSkinned(int node);
+    // The mesh in that pose as a child to instance, none if it shows nothing. Made once for each
+    // mesh, morph weights and skin (-1: none).
+    std::optional<ChildRef> meshFor(const tinygltf::Node& node, int skin, const std::string& path);
+    std::vector<Affine> jointTransforms(int skin, const std::string& path) const;
     void place(ChildRef mesh, const Affine& world_from_mesh, const std::string& path);
     std::vector<Affine> gpuInstances(const tinygltf::Value& extension, const std::string& path);
     void addCamera(const tinygltf::Node& node, const Affine& world_from_node,
@@ -45,7 +53,9 @@ private:
     const GltfDocument& document_;
     Scene& scene_;
     GltfMaterials materials_;
-    std::map<int, int> meshes_;  // by index in the file; -1: nothing to draw
+    std::map<std::tuple<int, std::vector<double>, int>, std::optional<ChildRef>> meshes_;
+    std::vector<int> skinned_;  // nodes, which wait until the places of all joints are known
+    std::map<int, Affine> world_from_node_;  // of all nodes, if there are skins
     std::vector<Placement> placements_;
     std::set<std::string> camera_names_;
     std::map<std::string, int> camera_numbers_;  // given to cameras of the same name
@@ -140,40 +150,98 @@ std::vector<Placement> NodeWalk::run() {
             push(node.children[i], world_from_node, path + ".children[" + std::to_string(i) + "]");
         }
     }
+    for (const int node : skinned_) placeSkinned(node);
     return std::move(placements_);
 }
 
 void NodeWalk::visit(int index, const Affine& world_from_node) {
     const tinygltf::Node& node = document_.model.nodes[index];
     const std::string path = "nodes[" + std::to_string(index) + "]";
-    if (node.mesh >= 0) placeMesh(node, world_from_node, path);
+    if (!document_.model.skins.empty()) world_from_node_.emplace(index, world_from_node);
+    if (node.mesh >= 0 && node.skin >= 0) {
+        skinned_.push_back(index);
+    } else if (node.mesh >= 0) {
+        placeMesh(node, world_from_node, path);
+    }
     if (node.camera >= 0) addCamera(node, world_from_node, path);
-    if (node.skin >= 0)
-        document_.context.warnOnce(document_.name,
-                                   "skins are ignored: meshes stay in their bind pose");
     if (const auto it = node.extensions.find("KHR_lights_punctual"); it != node.extensions.end()) {
         addGltfLight(document_, it->second, world_from_node,
                      path + ".extensions.KHR_lights_punctual", scene_.lighting);
     }
 }
 
+std::optional<ChildRef> NodeWalk::meshFor(const tinygltf::Node& node, int skin,
+                                          const std::string& path) {
+    document_.checkIndex(node.mesh, document_.model.meshes.size(), path + ".mesh", "meshes");
+    GltfPose pose;
+    pose.morph_weights =
+        node.weights.empty() ? document_.model.meshes[node.mesh].weights : node.weights;
+    while (!pose.morph_weights.empty() && pose.morph_weights.back() == 0.0)
+        pose.morph_weights.pop_back();
+    const auto key = std::make_tuple(node.mesh, pose.morph_weights, skin);
+    if (const auto it = meshes_.find(key); it != meshes_.end()) return it->second;
+    if (skin >= 0) pose.world_from_bind = jointTransforms(skin, path);
+    Mesh mesh = loadGltfMesh(document_, node.mesh, pose, materials_);
+    std::optional<ChildRef> child;
+    if (!mesh.triangles.empty()) {
+        scene_.meshes.push_back(std::move(mesh));
+        child = ChildRef::mesh(uint32_t(scene_.meshes.size()) - 1);
+    }
+    return meshes_.emplace(key, child).first->second;
+}
+
+std::vector<Affine> NodeWalk::jointTransforms(int index, const std::string& path) const {
+    document_.checkIndex(index, document_.model.skins.size(), path + ".skin", "skins");
+    const tinygltf::Skin& skin = document_.model.skins[index];
+    const std::string skin_path = "skins[" + std::to_string(index) + "]";
+    std::vector<Affine> result(skin.joints.size());
+    std::vector<float> matrices;
+    if (skin.inverseBindMatrices >= 0) {
+        const std::string place = skin_path + ".inverseBindMatrices";
+        const size_t count =
+            accessorCount(document_, skin.inverseBindMatrices, {TINYGLTF_TYPE_MAT4}, place);
+        if (count < result.size()) {
+            document_.fail(ErrorCode::kInvalidScene, place,
+                           "count " + std::to_string(count) + " < the " +
+                               std::to_string(result.size()) + " joints");
+        }
+        matrices = readFloats(document_, skin.inverseBindMatrices, 16, 0.0f, place);
+    }
+    for (size_t j = 0; j < result.size(); ++j) {
+        const std::string place = skin_path + ".joints[" + std::to_string(j) + "]";
+        document_.checkIndex(skin.joints[j], document_.model.nodes.size(), place, "nodes");
+        Affine joint_from_bind;
+        if (!matrices.empty()) {
+            const std::vector<double> m(matrices.begin() + std::ptrdiff_t(j * 16),
+                                        matrices.begin() + std::ptrdiff_t(j * 16 + 16));
+            if (!affineFromMatrix(m.data(), joint_from_bind))
+                document_.fail(ErrorCode::kInvalidScene, place,
+                               "the last row of its inverse bind matrix is not 0 0 0 1");
+        }
+        const auto it = world_from_node_.find(skin.joints[j]);
+        if (it == world_from_node_.end())
+            document_.fail(ErrorCode::kInvalidScene, place, "is not in the scene that is shown");
+        result[j] = it->second * joint_from_bind;
+    }
+    return result;
+}
+
+// The transform of a skinned mesh's own node has no meaning: its joints say where it is.
+void NodeWalk::placeSkinned(int index) {
+    const tinygltf::Node& node = document_.model.nodes[index];
+    const std::string path = "nodes[" + std::to_string(index) + "]";
+    if (const auto child = meshFor(node, node.skin, path)) place(*child, Affine(), path);
+}
+
 void NodeWalk::placeMesh(const tinygltf::Node& node, const Affine& world_from_node,
                          const std::string& path) {
-    document_.checkIndex(node.mesh, document_.model.meshes.size(), path + ".mesh", "meshes");
-    auto it = meshes_.find(node.mesh);
-    if (it == meshes_.end()) {
-        Mesh mesh = loadGltfMesh(document_, node.mesh, materials_);
-        const bool is_empty = mesh.triangles.empty();
-        if (!is_empty) scene_.meshes.push_back(std::move(mesh));
-        it = meshes_.emplace(node.mesh, is_empty ? -1 : int(scene_.meshes.size()) - 1).first;
-    }
-    if (it->second < 0) return;
-    const ChildRef child = ChildRef::mesh(uint32_t(it->second));
+    const std::optional<ChildRef> child = meshFor(node, -1, path);
+    if (!child) return;
     const auto instancing = node.extensions.find("EXT_mesh_gpu_instancing");
-    if (instancing == node.extensions.end()) return place(child, world_from_node, path);
+    if (instancing == node.extensions.end()) return place(*child, world_from_node, path);
     const std::string place_path = path + ".extensions.EXT_mesh_gpu_instancing";
     for (const Affine& node_from_instance : gpuInstances(instancing->second, place_path)) {
-        place(child, world_from_node * node_from_instance, place_path);
+        place(*child, world_from_node * node_from_instance, place_path);
     }
 }
 
@@ -278,8 +346,7 @@ ChildRef loadGltf(const std::filesystem::path& path, const std::string& name, Sc
     context.throwIfCancelled();
     const GltfDocument document = openGltf(path, name, context);
     const std::vector<Placement> placements = NodeWalk(document, scene).run();
-    if (placements.empty())
-        throw Error(ErrorCode::kInvalidScene, document.name, "its scene shows no triangles");
+    if (placements.empty()) return addEmptyGroup(scene, document.name);
 
     const Affine& first = placements[0].group_from_child;
     if (placements.size() == 1 && first.linear == DMat3(1.0) && first.translation == DVec3(0.0))

@@ -3,8 +3,12 @@
 // why: tinygltf only turns JSON into structs here. It would read files outside of the folder, take
 // other lengths than the specification allows for wrong, drop what has a wrong type without a word,
 // and read beyond the end of a cut-off .glb.
+// why: compiled in here, as Draco's library exports an older tinygltf of its own, which would take
+// the place of a shared one.
+#define TINYGLTF_IMPLEMENTATION
 #include <scenegraph/io/gltf_document.h>
 
+#include <scenegraph/io/gltf_compression.h>
 #include <scenegraph/io/schemas.h>
 
 #include <algorithm>
@@ -17,9 +21,9 @@ namespace stipple {
 namespace {
 
 constexpr std::array kSupportedExtensions = {
-    "EXT_mesh_gpu_instancing", "EXT_texture_webp",
-    "KHR_lights_punctual",     "KHR_materials_emissive_strength",
-    "KHR_materials_unlit",     "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "EXT_texture_webp",
+    "KHR_draco_mesh_compression", "KHR_lights_punctual",     "KHR_materials_emissive_strength",
+    "KHR_materials_specular",     "KHR_materials_unlit",     "KHR_mesh_quantization",
     "KHR_texture_transform"};
 
 struct Container {
@@ -167,6 +171,12 @@ void checkExtensions(const GltfDocument& document, const Json& root) {
     }
 }
 
+// A buffer that only readers without EXT_meshopt_compression need.
+bool isFallback(const Json& buffer) {
+    const auto place = Json::json_pointer("/extensions/EXT_meshopt_compression/fallback");
+    return buffer.contains(place) && buffer[place].get<bool>();
+}
+
 void loadBuffers(GltfDocument& document, const Json& buffers, const Container& container) {
     for (size_t i = 0; i < buffers.size(); ++i) {
         const std::string path = "buffers[" + std::to_string(i) + "]";
@@ -179,6 +189,9 @@ void loadBuffers(GltfDocument& document, const Json& buffers, const Container& c
             document.context.budget.require(double(container.binary.size()), document.where(path),
                                             "the buffer's bytes");
             bytes = std::string(container.binary);
+        } else if (isFallback(buffers[i])) {  // read by nothing that knows the extension
+            document.buffers.emplace_back();
+            continue;
         } else if (length) {
             document.fail(ErrorCode::kInvalidScene, path,
                           "has no uri, and there is no BIN chunk for it");
@@ -204,6 +217,27 @@ Json takeArray(Json& root, const char* key) {
     return array;
 }
 
+// Takes the indices out of all primitives: tinygltf refuses those without a buffer view, which
+// compressed ones have not.
+std::vector<int> takeIndices(Json& root) {
+    std::vector<int> indices;
+    if (!root.contains("meshes")) return indices;
+    for (Json& mesh : root["meshes"]) {
+        for (Json& primitive : mesh["primitives"]) {
+            indices.push_back(primitive.value("indices", -1));
+            primitive.erase("indices");
+        }
+    }
+    return indices;
+}
+
+void putIndices(const std::vector<int>& indices, tinygltf::Model& model) {
+    size_t i = 0;
+    for (tinygltf::Mesh& mesh : model.meshes) {
+        for (tinygltf::Primitive& primitive : mesh.primitives) primitive.indices = indices.at(i++);
+    }
+}
+
 }  // namespace
 
 void GltfDocument::fail(ErrorCode code, const std::string& path, const std::string& message) const {
@@ -220,7 +254,7 @@ void GltfDocument::checkIndex(int index, size_t count, const std::string& path,
 
 GltfDocument openGltf(const std::filesystem::path& path, const std::string& name,
                       LoadContext& context) {
-    GltfDocument document{oneLine(name, 300), folderOf(path.string()), {}, {}, {}, context};
+    GltfDocument document{oneLine(name, 300), folderOf(path.string()), {}, {}, {}, {}, context};
     const std::string file = readFile(path, context.budget, document.name);
     const Container container = splitContainer(file, document.name);
     context.budget.require(10.0 * double(container.json.size()), document.name,
@@ -242,7 +276,8 @@ GltfDocument openGltf(const std::filesystem::path& path, const std::string& name
     for (const Json& image : takeArray(root, "images")) {
         document.images.push_back({image.value("uri", ""), image.value("bufferView", -1)});
     }
-    for (const char* unused : {"animations", "skins", "extras"}) root.erase(unused);
+    for (const char* unused : {"animations", "extras"}) root.erase(unused);
+    const std::vector<int> indices = takeIndices(root);
     const std::string stripped = root.dump();
     root = Json();
     if (stripped.size() > std::numeric_limits<unsigned>::max()) {
@@ -254,24 +289,32 @@ GltfDocument openGltf(const std::filesystem::path& path, const std::string& name
                                     unsigned(stripped.size()), "")) {
         throw Error(ErrorCode::kInvalidScene, document.name, oneLine(error));
     }
+    putIndices(indices, document.model);
     loadBuffers(document, buffers, container);
+    decodeMeshoptViews(document);
     return document;
+}
+
+std::string_view bufferBytes(const GltfDocument& document, int buffer, size_t offset, size_t length,
+                             const std::string& path) {
+    document.checkIndex(buffer, document.buffers.size(), path + ".buffer", "buffers");
+    const std::string& bytes = document.buffers[buffer];
+    if (offset > bytes.size() || length > bytes.size() - offset) {
+        document.fail(ErrorCode::kInvalidScene, path,
+                      "bytes " + std::to_string(offset) + " + " + std::to_string(length) +
+                          " lie beyond the " + std::to_string(bytes.size()) + " bytes of buffers[" +
+                          std::to_string(buffer) + "]");
+    }
+    return std::string_view(bytes).substr(offset, length);
 }
 
 std::string_view bufferViewBytes(const GltfDocument& document, int view, const std::string& path) {
     document.checkIndex(view, document.model.bufferViews.size(), path, "bufferViews");
+    if (const auto it = document.decoded_views.find(view); it != document.decoded_views.end())
+        return it->second;
     const tinygltf::BufferView& v = document.model.bufferViews[view];
-    const std::string view_path = "bufferViews[" + std::to_string(view) + "]";
-    document.checkIndex(v.buffer, document.buffers.size(), view_path + ".buffer", "buffers");
-    const std::string& buffer = document.buffers[v.buffer];
-    if (v.byteOffset > buffer.size() || v.byteLength > buffer.size() - v.byteOffset) {
-        document.fail(ErrorCode::kInvalidScene, view_path,
-                      "bytes " + std::to_string(v.byteOffset) + " + " +
-                          std::to_string(v.byteLength) + " lie beyond the " +
-                          std::to_string(buffer.size()) + " bytes of buffers[" +
-                          std::to_string(v.buffer) + "]");
-    }
-    return std::string_view(buffer).substr(v.byteOffset, v.byteLength);
+    return bufferBytes(document, v.buffer, v.byteOffset, v.byteLength,
+                       "bufferViews[" + std::to_string(view) + "]");
 }
 
 std::string imageBytes(const GltfDocument& document, int image) {

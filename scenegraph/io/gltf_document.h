@@ -10,6 +10,7 @@
 #include <tiny_gltf.h>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,7 @@ struct GltfDocument {
     tinygltf::Model model;         // without buffers and images
     std::vector<std::string> buffers;
     std::vector<GltfImage> images;
+    std::map<int, std::string> decoded_views;  // compressed buffer views, by index
     LoadContext& context;
 
     // Throws Error with where "file: path".
@@ -42,7 +44,12 @@ struct GltfDocument {
 GltfDocument openGltf(const std::filesystem::path& path, const std::string& name,
                       LoadContext& context);
 
-// Bytes [offset, offset + length) of a buffer view. Throws kInvalidScene if they are not all there.
+// Bytes [offset, offset + length) of a buffer. Throws kInvalidScene if they are not all there.
+std::string_view bufferBytes(const GltfDocument& document, int buffer, size_t offset, size_t length,
+                             const std::string& path);
+
+// The bytes of a buffer view, decoded if it is compressed. Throws kInvalidScene if they are not all
+// there.
 std::string_view bufferViewBytes(const GltfDocument& document, int view, const std::string& path);
 
 // The bytes of an image, wherever they are.

@@ -4,6 +4,7 @@
 #include <core/image.h>
 #include <scenegraph/io/picture.h>
 
+#include <algorithm>
 #include <limits>
 
 namespace stipple {
@@ -25,17 +26,27 @@ Vec2 pairOf(const tinygltf::Value& object, const char* key, Vec2 fallback) {
     return Vec2(pair.Get(0).GetNumberAsDouble(), pair.Get(1).GetNumberAsDouble());
 }
 
-GltfTextureUse textureUse(const tinygltf::TextureInfo& info) {
-    GltfTextureUse use;
-    use.is_textured = true;
-    use.texcoord = info.texCoord;
+// TextureInfo or NormalTextureInfo.
+template <class Info>
+GltfUvLayer uvLayer(const Info& info) {
+    GltfUvLayer layer;
+    layer.texcoord = info.texCoord;
     if (const tinygltf::Value* transform = extension(info.extensions, "KHR_texture_transform")) {
-        use.offset = pairOf(*transform, "offset", use.offset);
-        use.scale = pairOf(*transform, "scale", use.scale);
-        use.rotation = float(numberOf(*transform, "rotation", 0.0));
-        if (transform->Has("texCoord")) use.texcoord = transform->Get("texCoord").GetNumberAsInt();
+        layer.offset = pairOf(*transform, "offset", layer.offset);
+        layer.scale = pairOf(*transform, "scale", layer.scale);
+        layer.rotation = float(numberOf(*transform, "rotation", 0.0));
+        if (transform->Has("texCoord"))
+            layer.texcoord = transform->Get("texCoord").GetNumberAsInt();
     }
-    return use;
+    return layer;
+}
+
+// The number of the layer among the material's, added if it is new.
+int layerIndex(const GltfUvLayer& layer, std::vector<GltfUvLayer>& layers) {
+    const auto it = std::find(layers.begin(), layers.end(), layer);
+    if (it != layers.end()) return int(it - layers.begin());
+    layers.push_back(layer);
+    return int(layers.size()) - 1;
 }
 
 Wrap wrapOf(int gl_wrap) {
@@ -45,34 +56,55 @@ Wrap wrapOf(int gl_wrap) {
 
 }  // namespace
 
-Vec2 GltfTextureUse::apply(Vec2 uv) const {
+Vec2 GltfUvLayer::apply(Vec2 uv) const {
     // Counter-clockwise as the picture is seen, v pointing down.
     const Vec2 p = uv * scale;
     const float c = std::cos(rotation), s = std::sin(rotation);
     return offset + Vec2(c * p.x + s * p.y, c * p.y - s * p.x);
 }
 
-const GltfMaterial& GltfMaterials::get(int material, const std::string& path) {
-    if (const auto it = materials_.find(material); it != materials_.end()) return it->second;
+const GltfMaterial& GltfMaterials::get(int material, bool for_points, const std::string& path) {
+    const auto key = std::make_pair(material, for_points);
+    if (const auto it = materials_.find(key); it != materials_.end()) return it->second;
     Material converted;
     GltfMaterial result;
     if (material < 0) {
         converted.name = "default";
     } else {
         document_.checkIndex(material, document_.model.materials.size(), path, "materials");
-        converted = convert(document_.model.materials[material], result.base_texture,
+        converted = convert(document_.model.materials[material], for_points, result,
                             "materials[" + std::to_string(material) + "]");
     }
+    converted.double_sided |= for_points;
     if (scene_.materials.size() > std::numeric_limits<uint16_t>::max()) {
         document_.fail(ErrorCode::kUnsupported, path, "the scene has more than 65536 materials");
     }
     result.index = uint16_t(scene_.materials.size());
     scene_.materials.push_back(std::move(converted));
-    return materials_.emplace(material, result).first->second;
+    return materials_.emplace(key, std::move(result)).first->second;
 }
 
-Material GltfMaterials::convert(const tinygltf::Material& source, GltfTextureUse& use,
-                                const std::string& path) {
+Vec3 GltfMaterials::dielectricSpecular(const tinygltf::Material& source, const std::string& path) {
+    constexpr float kUsual = 0.04f;
+    const tinygltf::Value* specular = extension(source.extensions, "KHR_materials_specular");
+    if (!specular) return Vec3(kUsual);
+    const std::string place = path + ".extensions.KHR_materials_specular.";
+    const auto meanOf = [&](const char* key, bool is_srgb) {
+        if (!specular->Has(key)) return Vec4(1.0f);
+        return mean(specular->Get(key).Get("index").GetNumberAsInt(), is_srgb, place + key);
+    };
+    float factor = float(numberOf(*specular, "specularFactor", 1.0));
+    factor *= meanOf("specularTexture", false).a;
+    Vec3 color = Vec3(meanOf("specularColorTexture", true));
+    if (specular->Has("specularColorFactor")) {
+        const tinygltf::Value& rgb = specular->Get("specularColorFactor");
+        for (int c = 0; c < 3; ++c) color[c] *= float(rgb.Get(c).GetNumberAsDouble());
+    }
+    return glm::min(kUsual * color, Vec3(1.0f)) * factor;
+}
+
+Material GltfMaterials::convert(const tinygltf::Material& source, bool for_points,
+                                GltfMaterial& use, const std::string& path) {
     const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
     Material m;
     m.name = source.name;
@@ -83,35 +115,50 @@ Material GltfMaterials::convert(const tinygltf::Material& source, GltfTextureUse
     m.double_sided = source.doubleSided;
     m.unlit = extension(source.extensions, "KHR_materials_unlit") != nullptr;
 
-    const Vec3 base(pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]);
-    Vec3 mean_base = base;
+    m.base_color = Vec3(pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]);
+    Vec3 mean_base = m.base_color;
     m.alpha = m.alpha_mode == AlphaMode::kOpaque ? 1.0f : float(pbr.baseColorFactor[3]);
     if (pbr.baseColorTexture.index >= 0) {
         const std::string texture_path = path + ".pbrMetallicRoughness.baseColorTexture.index";
-        m.base_texture =
-            texture(pbr.baseColorTexture.index, m.alpha_mode == AlphaMode::kOpaque, texture_path);
+        m.base_texture = texture(pbr.baseColorTexture.index, true,
+                                 m.alpha_mode == AlphaMode::kOpaque, texture_path);
         mean_base *= Vec3(mean(pbr.baseColorTexture.index, true, texture_path));
-        use = textureUse(pbr.baseColorTexture);
+        layerIndex(uvLayer(pbr.baseColorTexture), use.uv_layers);  // the first: Mesh::uvs
     }
+    if (m.unlit) return m;
 
-    // Only the base colour varies over a surface; of all other textures the mean counts.
     float metallic = float(pbr.metallicFactor), roughness = float(pbr.roughnessFactor);
-    if (pbr.metallicRoughnessTexture.index >= 0 && !m.unlit) {
-        const Vec4 texel = mean(pbr.metallicRoughnessTexture.index, false,
-                                path + ".pbrMetallicRoughness.metallicRoughnessTexture.index");
+    if (pbr.metallicRoughnessTexture.index >= 0) {
+        const int index = pbr.metallicRoughnessTexture.index;
+        const std::string texture_path =
+            path + ".pbrMetallicRoughness.metallicRoughnessTexture.index";
+        const Vec4 texel = mean(index, false, texture_path);
+        if (metallic > 0.0f && texel.b > 0.0f) {
+            m.metallic_map = {texture(index, false, true, texture_path),
+                              layerIndex(uvLayer(pbr.metallicRoughnessTexture), use.uv_layers)};
+            m.metallic = metallic;
+        }
         roughness *= texel.g;
         metallic *= texel.b;
     }
-    // Metallic-roughness as diffuse and a Phong lobe: a metal has no diffuse part and mirrors in
-    // its colour, all else mirrors 4 %; a microfacet lobe of width alpha = roughness^2 is about as
-    // wide as a Phong lobe of exponent 2 / alpha^2 - 2.
-    if (m.unlit) {
-        m.base_color = base;
-    } else {
-        m.base_color = base * (1.0f - metallic);
-        m.specular = glm::mix(Vec3(0.04f), mean_base, metallic);
-        const float r4 = roughness * roughness * roughness * roughness;
-        m.shininess = std::clamp(2.0f / std::max(r4, 1e-6f) - 2.0f, 1.0f, 1000.0f);
+    // Metallic-roughness as diffuse and a Phong lobe: a metal mirrors in its colour. What it
+    // mirrors of its surroundings is not drawn, but the rougher it is the more that looks like
+    // scattered light, and is counted as such. A microfacet lobe of width alpha = roughness^2 is
+    // about as wide as a Phong lobe of exponent 2 / alpha^2 - 2. Of what is mirrored, the textures'
+    // means count.
+    const float smooth = 1.0f - roughness * roughness;
+    metallic *= smooth, m.metallic *= smooth;
+    if (m.metallic_map.texture == kNoTexture) m.base_color *= 1.0f - metallic;
+    m.specular = glm::mix(dielectricSpecular(source, path), mean_base, metallic);
+    const float r4 = roughness * roughness * roughness * roughness;
+    m.shininess = std::clamp(2.0f / std::max(r4, 1e-6f) - 2.0f, 1.0f, 1000.0f);
+
+    if (source.normalTexture.index >= 0 && !for_points) {
+        m.normal_map = {
+            texture(source.normalTexture.index, false, true, path + ".normalTexture.index"),
+            layerIndex(uvLayer(source.normalTexture), use.uv_layers)};
+        m.normal_scale = float(source.normalTexture.scale);
+        use.needs_tangents = true;
     }
 
     m.emissive = Vec3(source.emissiveFactor[0], source.emissiveFactor[1], source.emissiveFactor[2]);
@@ -170,18 +217,19 @@ Vec4 GltfMaterials::mean(int texture, bool is_srgb, const std::string& path) {
     return result;
 }
 
-int GltfMaterials::texture(int index, bool is_opaque, const std::string& path) {
+int GltfMaterials::texture(int index, bool is_srgb, bool is_opaque, const std::string& path) {
     const int image = imageOf(index, path);
     const tinygltf::Texture& source = document_.model.textures[index];
     const std::string sampler_path = "textures[" + std::to_string(index) + "].sampler";
     if (source.sampler >= 0)
         document_.checkIndex(source.sampler, document_.model.samplers.size(), sampler_path,
                              "samplers");
-    const auto key = std::make_tuple(image, source.sampler, is_opaque);
+    const auto key = std::make_tuple(image, source.sampler, is_srgb, is_opaque);
     if (const auto it = textures_.find(key); it != textures_.end()) return it->second;
 
     Texture result;
     result.name = source.name;
+    result.srgb = is_srgb;
     if (source.sampler >= 0) {
         const tinygltf::Sampler& sampler = document_.model.samplers[source.sampler];
         result.wrap_u = wrapOf(sampler.wrapS);

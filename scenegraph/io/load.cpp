@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <scenegraph/io/load.h>
 
-#include <scenegraph/io/gltf.h>
 #include <scenegraph/io/json.h>
+#include <scenegraph/io/model.h>
 #include <scenegraph/io/scene_file.h>
 
 #include <new>
@@ -13,7 +13,7 @@ namespace {
 
 Scene loadAsset(const std::string& path, LoadContext& context) {
     Scene scene;
-    const ChildRef child = loadGltf(std::filesystem::path(path), path, scene, context);
+    const ChildRef child = loadModel(std::filesystem::path(path), path, scene, context);
     if (!child.isGroup()) {
         Group group;
         group.name = scene.meshes[child.index()].name;
@@ -29,23 +29,18 @@ Scene loadAsset(const std::string& path, LoadContext& context) {
     return scene;
 }
 
-bool endsWith(const std::string& path, const char* extension) {
-    std::string lower = path;
-    for (char& c : lower) c = char(std::tolower(uint8_t(c)));
-    return lower.ends_with(extension);
-}
-
 }  // namespace
 
 Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool& pool,
                 Diagnostics& diagnostics) {
     try {
-        LoadContext context(options, diagnostics, folderOf(path));
+        LoadContext context(options, diagnostics, folderOf(path), &pool);
         context.throwIfCancelled();
-        const bool is_asset = endsWith(path, ".gltf") || endsWith(path, ".glb");
-        if (!is_asset && !endsWith(path, ".scene.json")) {
+        const bool is_asset = isModelFile(path);
+        if (!is_asset && !path.ends_with(".scene.json")) {
             throw Error(ErrorCode::kUnsupported, oneLine(path, 300),
-                        "is neither a scene file (*.scene.json) nor .gltf nor .glb");
+                        std::string("is neither a scene file (*.scene.json) nor a model (") +
+                            kModelExtensions + ")");
         }
         Scene scene =
             is_asset ? loadAsset(path, context) : readSceneFile(path, path, context, pool);
@@ -53,12 +48,7 @@ Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool&
         context.throwIfCancelled();
         buildScene(scene, pool);
         const DBox3 bounds = sceneBounds(scene);
-        if (bounds.isEmpty()) {
-            if (is_asset)
-                throw Error(ErrorCode::kInvalidScene, oneLine(path, 300),
-                            "all its triangles have no area");
-            diagnostics.warn(oneLine(path, 300), "the scene is empty");
-        }
+        if (bounds.isEmpty()) diagnostics.warn(oneLine(path, 300), "the scene is empty");
         // Single assets always have a camera of that name, before their own.
         if (scene.cameras.empty() || is_asset) {
             Camera camera = bounds.isEmpty() ? Camera() : cameraForBounds(bounds);

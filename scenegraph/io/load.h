@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From files to a built scene: the scene file (*.scene.json) and single assets (.gltf, .glb).
+// From files to a built scene: the scene file (*.scene.json) and single models (.gltf, .glb, .ply,
+// .obj).
 #pragma once
 
 #include <core/error.h>

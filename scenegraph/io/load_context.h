@@ -35,14 +35,16 @@ inline constexpr double kBytesPerTriangle = 80.0;
 inline constexpr double kBytesPerVertex = 48.0;
 
 struct LoadContext {
-    LoadContext(const LoadOptions& o, Diagnostics& d, std::filesystem::path f)
-        : options(o), diagnostics(d), folder(std::move(f)), budget(o.memory_limit_mb) {}
+    LoadContext(const LoadOptions& o, Diagnostics& d, std::filesystem::path f,
+                ThreadPool* p = nullptr)
+        : options(o), diagnostics(d), folder(std::move(f)), budget(o.memory_limit_mb), pool(p) {}
 
     const LoadOptions& options;
     Diagnostics& diagnostics;
     std::filesystem::path
         folder;  // canonical; files must lie below it unless options.allow_outside
     MemoryBudget budget;
+    ThreadPool* pool;              // for long loops; nullptr: none
     std::set<std::string> warned;  // warnings given, so that each is given once
 
     void warnOnce(const std::string& where, const std::string& message);

@@ -84,4 +84,21 @@ std::string encodePng(const Texture::Level& level) {
     return std::string(bytes.begin(), bytes.end());
 }
 
+int addTexture(Scene& scene, const std::filesystem::path& file, bool is_srgb, bool is_opaque,
+               LoadContext& context, const std::string& where) {
+    Texture texture;
+    texture.name = oneLine(file.filename().string());
+    texture.srgb = is_srgb;
+    texture.levels.push_back(
+        decodePicture(readFile(file, context.budget, where), context.budget, where));
+    std::vector<uint8_t>& rgba = texture.levels[0].rgba;
+    context.budget.take(double(rgba.size()) * 3.0, where, "the texture's texels");
+    if (is_opaque) {
+        for (size_t i = 3; i < rgba.size(); i += 4) rgba[i] = 255;
+    }
+    buildMipmaps(texture);
+    scene.textures.push_back(std::move(texture));
+    return int(scene.textures.size()) - 1;
+}
+
 }  // namespace stipple

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <scenegraph/io/gltf.h>
+#include <scenegraph/io/model.h>
 #include <scenegraph/io/number_picture.h>
 #include <scenegraph/io/picture.h>
 #include <scenegraph/io/scene_reader.h>
@@ -17,11 +17,9 @@ ChildRef loadFile(SceneReader& reader, const Json& asset, const JsonPath& path) 
     const JsonPath file_path = joined(path, {"file"});
     const std::string& file = asset["file"].get_ref<const std::string&>();
     const std::filesystem::path full = reader.file(asset["file"], file_path);
-    std::string extension = full.extension().string();
-    for (char& c : extension) c = char(std::tolower(uint8_t(c)));
-    if (extension != ".gltf" && extension != ".glb") {
+    if (!isModelFile(full)) {
         throw Error(ErrorCode::kUnsupported, reader.where(file_path),
-                    inQuotes(file) + " is neither .gltf nor .glb");
+                    inQuotes(file) + " is no model (" + kModelExtensions + ")");
     }
     if (const auto it = reader.files.find(full.string()); it != reader.files.end())
         return it->second;
@@ -29,7 +27,7 @@ ChildRef loadFile(SceneReader& reader, const Json& asset, const JsonPath& path) 
     const size_t n_cameras = reader.scene.cameras.size(),
                  n_suns = reader.scene.lighting.suns.size(),
                  n_points = reader.scene.lighting.points.size();
-    const ChildRef child = loadGltf(full, file, reader.scene, reader.context);
+    const ChildRef child = loadModel(full, file, reader.scene, reader.context);
     reader.scene.cameras.resize(n_cameras);
     reader.scene.lighting.suns.resize(n_suns);
     reader.scene.lighting.points.resize(n_points);
@@ -189,21 +187,6 @@ HeightField readHeightMap(SceneReader& reader, const Json& source, const JsonPat
     return field;
 }
 
-int addTexture(SceneReader& reader, const Json& file, const JsonPath& path) {
-    const std::string where = reader.where(path);
-    Texture texture;
-    texture.name = oneLine(file.get<std::string>());
-    texture.wrap_u = texture.wrap_v = Wrap::kClamp;
-    texture.levels.push_back(
-        decodePicture(readFile(reader.file(file, path), reader.context.budget, where),
-                      reader.context.budget, where));
-    reader.context.budget.take(double(texture.levels[0].rgba.size()) * 4.0 / 3.0, where,
-                               "the texture's texels");
-    buildMipmaps(texture);
-    reader.scene.textures.push_back(std::move(texture));
-    return int(reader.scene.textures.size()) - 1;
-}
-
 // A terrain from a height map, under a picture or coloured by height and slope.
 GeneratedMesh heightMapTerrain(SceneReader& reader, const std::string& name, const Json& source,
                                const JsonPath& path) {
@@ -221,24 +204,19 @@ GeneratedMesh heightMapTerrain(SceneReader& reader, const std::string& name, con
     Material& material = terrain.materials.emplace_back();
     material.name = "ground";
     material.base_color = Vec3(1.0f);
-    material.base_texture = addTexture(reader, source["texture"], joined(path, {"texture"}));
+    const JsonPath texture_path = joined(path, {"texture"});
+    material.base_texture = addTexture(reader.scene, reader.file(source["texture"], texture_path),
+                                       true, false, reader.context, reader.where(texture_path));
+    Texture& texture = reader.scene.textures[size_t(material.base_texture)];
+    texture.wrap_u = texture.wrap_v = Wrap::kClamp;
     return terrain;
 }
 
 ChildRef addGenerated(SceneReader& reader, const std::string& name, GeneratedMesh generated,
                       const JsonPath& path) {
-    Scene& scene = reader.scene;
-    const size_t first = scene.materials.size();
-    if (first + generated.materials.size() > size_t(std::numeric_limits<uint16_t>::max()) + 1) {
-        throw Error(ErrorCode::kUnsupported, reader.where(path),
-                    "the scene has more than 65536 materials");
-    }
-    for (uint16_t& material : generated.mesh.triangle_material)
-        material = uint16_t(material + first);
-    for (Material& material : generated.materials) scene.materials.push_back(std::move(material));
     generated.mesh.name = oneLine(name);
-    scene.meshes.push_back(std::move(generated.mesh));
-    return ChildRef::mesh(uint32_t(scene.meshes.size() - 1));
+    return addModel(reader.scene, std::move(generated.mesh), std::move(generated.materials),
+                    reader.where(path));
 }
 
 }  // namespace

@@ -39,12 +39,18 @@ Vec4 sampleTexture(const Texture& texture, Vec2 uv, float footprint_uv);
 
 inline constexpr int kNoTexture = -1;
 
+// A texture and the texture coordinates it is looked up with.
+struct TextureUse {
+    int texture = kNoTexture;  // index into Scene::textures
+    int uv_layer = 0;          // 0: Mesh::uvs, n: Mesh::more_uvs[n - 1]
+};
+
 // Diffuse plus a Phong lobe; glTF's metallic-roughness is mapped to it when loaded.
 struct Material {
     std::string name;
     Vec3 base_color = Vec3(0.8f);   // linear, multiplied with texture and vertex colour
     float alpha = 1.0f;             // multiplied with the texture's and the vertex' alpha
-    int base_texture = kNoTexture;  // index into Scene::textures
+    int base_texture = kNoTexture;  // index into Scene::textures, looked up with Mesh::uvs
     AlphaMode alpha_mode = AlphaMode::kOpaque;
     float alpha_cutoff = 0.5f;   // kMask: below it there is no surface
     bool double_sided = false;   // single-sided surfaces are not there when seen from behind
@@ -54,6 +60,11 @@ struct Material {
         0.0f;  // share of the diffuse light that comes through from behind (leaves)
     Vec3 emissive = Vec3(0.0f);  // linear radiance
     bool unlit = false;          // base colour as it is
+
+    TextureUse normal_map;      // tangent space: RGB in [0, 1] stands for x, y, z in [-1, 1]
+    float normal_scale = 1.0f;  // of the map's x and y
+    TextureUse metallic_map;  // blue, times `metallic`: the share of base_color that is not diffuse
+    float metallic = 0.0f;    // with metallic_map only; else base_color is the diffuse colour
 };
 
 }  // namespace stipple

@@ -41,12 +41,12 @@ const std::vector<std::string> kAovNames = {"depth",  "normal",   "albedo",
 const HelpText kHelp = {
     "stipple render SCENE -o OUT.png|OUT.exr [options]",
     "Draws a picture of a scene and prints its path. SCENE is a scene file (*.scene.json) or a "
-    "single model (.gltf, .glb), for which a camera and a light are made.",
+    "single model (.gltf, .glb, .ply, .obj), for which a camera and a light are made.",
     {"stipple render scenes/forest.scene.json -o forest.png --width 1920 --height 1080",
      "stipple render tree.glb -o tree.exr --aov depth,normal --samples 4 --stats tree.json"}};
 
 void addOptions(CLI::App& app, RenderOptions& options) {
-    app.add_option("SCENE", options.scene, "*.scene.json, .gltf or .glb")
+    app.add_option("SCENE", options.scene, "*.scene.json, .gltf, .glb, .ply or .obj")
         ->required()
         ->group("Arguments");
     app.add_option(

@@ -237,7 +237,7 @@ TEST(IoGltfInvalid, refusesDamagedAndForeignPictures) {
 }
 
 TEST(IoGltfInvalid, refusesRequiredExtensionsAndVersionsByName) {
-    for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "VENDOR_x"}) {
+    for (const char* name : {"KHR_texture_basisu", "VENDOR_x"}) {
         GltfBuilder b = GltfBuilder::triangle();
         b.json["extensionsUsed"] = b.json["extensionsRequired"] = {name};
         const Loaded loaded = tryLoadText("t.gltf", b.gltf());
@@ -273,9 +273,6 @@ TEST(IoGltfInvalid, flippedBytesLoadOrAreRefusedWithOneLine) {
         for (int k = 0; k <= i % 3; ++k) damaged[rng.next() % damaged.size()] = char(rng.next());
         const Loaded loaded = tryLoad(folder.write("t.glb", damaged), options);
         EXPECT_EQ(loaded.error.find('\n'), std::string::npos) << loaded.error;
-        if (loaded.error.empty()) {
-            EXPECT_EQ(loaded.scene.meshes.size(), 1u);
-        }
     }
 }
 
@@ -317,7 +314,9 @@ TEST(IoGltfInvalid, everyFileOfTheTestDataLoadsOrIsRefusedWithOneLine) {
     int loaded_count = 0, total = 0;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
         const std::string extension = entry.path().extension().string();
-        if (extension != ".gltf" && extension != ".glb") continue;
+        if (extension != ".gltf" && extension != ".glb" && extension != ".ply" &&
+            extension != ".obj")
+            continue;
         const Loaded loaded = tryLoad(entry.path().string());
         EXPECT_EQ(loaded.error.find('\n'), std::string::npos) << loaded.error;
         ++total;

@@ -301,7 +301,7 @@ TEST(IoSceneFile, refusesOtherFilesAndCycles) {
     EXPECT_EQ(cycle.code, ErrorCode::kInvalidScene);
     EXPECT_NE(cycle.error.find("contains itself"), std::string::npos);
 
-    EXPECT_EQ(tryLoadText("s.obj", "x").code, ErrorCode::kUnsupported);
+    EXPECT_EQ(tryLoadText("s.fbx", "x").code, ErrorCode::kUnsupported);
     EXPECT_EQ(tryLoad("/nonexistent/s.scene.json").code, ErrorCode::kFileNotFound);
     const Loaded broken = tryLoadText("s.scene.json", "{\n  \"version\": 1,\n}");
     EXPECT_EQ(broken.code, ErrorCode::kParse);

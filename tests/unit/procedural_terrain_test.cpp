@@ -113,12 +113,12 @@ TEST(ProceduralTerrain, erosionCutsValleysThatDrain) {
     // Places lower than all eight around, but for the border: hollows.
     const auto hollows = [](const HeightField& f) {
         int count = 0;
-        for (int j = 1; j + 1 < f.resolution; ++j) {
-            for (int i = 1; i + 1 < f.resolution; ++i) {
-                const float* h = f.heights.data() + j * f.resolution + i;
+        for (int j = 1; j + 1 < f.columns; ++j) {
+            for (int i = 1; i + 1 < f.columns; ++i) {
+                const float* h = f.heights.data() + j * f.columns + i;
                 bool lowest = true;
                 for (int d = 0; d < 9; ++d) {
-                    if (d != 4 && h[(d / 3 - 1) * f.resolution + d % 3 - 1] <= *h) lowest = false;
+                    if (d != 4 && h[(d / 3 - 1) * f.columns + d % 3 - 1] <= *h) lowest = false;
                 }
                 count += lowest;
             }
