@@ -22,7 +22,7 @@ public:
     int reach(bool narrow) const { return narrow && !is_splat_ ? 0 : side_ / 2; }
     const TileCounters& counters() const { return counters_; }
     // Kept points a pixel of the tile, if asked for.
-    const std::vector<uint16_t>& counts() const { return counts_; }
+    const std::vector<uint32_t>& counts() const { return counts_; }
 
 private:
     bool splat(DepthTile& tile, float sub_x, float sub_y, uint64_t key) const;
@@ -36,7 +36,7 @@ private:
     const bool wants_counts_;
     SubpixelRect inner_;
     TileCounters counters_;
-    std::vector<uint16_t> counts_;
+    std::vector<uint32_t> counts_;
     uint64_t since_refresh_ = 0;
 };
 

@@ -37,7 +37,7 @@ FootprintTable::FootprintTable(float k) {
             1.0f + (float(code % kWidthsPerOctave) + 0.5f) / float(kWidthsPerOctave);
         const Footprint footprint =
             code == kNoPatch
-                ? Footprint()
+                ? Footprint{0.5f / std::sqrt(std::max(k, 1.0f)), 0.0f}
                 : makeFootprint(
                       std::ldexp(mantissa, kFirstSubpixelExponent + code / kWidthsPerOctave), k);
         half_side[size_t(code)] = footprint.half_side;

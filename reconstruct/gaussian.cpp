@@ -165,10 +165,19 @@ private:
             const float cx = float(x0) + 0.5f * float(s), cy = float(y0) + 0.5f * float(s);
             lookup.lookUp(DepthTile::numberOf(nearest), cx, cy, sample);
             sums.object = sample.object;
-            const float per_weight = sum.weight > 0.0f ? sums.covered / sum.weight : 0.0f;
-            sums.radiance = sum.radiance * per_weight;
-            sums.normal = sum.normal * per_weight;
-            sums.albedo = sum.albedo * per_weight;
+            Weighted mean = sum;
+            if (!(sum.weight > 0.0f)) {  // no point near enough to the pixel's centre
+                Vec3 origin, direction;
+                context_.view.ray(cx, cy, origin, direction);
+                sample.position_camera = origin + direction * sample.depth;
+                mean = {shade(sample, (*context_.materials)[sample.material], *context_.lighting,
+                              context_.view),
+                        sample.normal_world, sample.albedo, 1.0f};
+            }
+            const float per_weight = sums.covered / mean.weight;
+            sums.radiance = mean.radiance * per_weight;
+            sums.normal = mean.normal * per_weight;
+            sums.albedo = mean.albedo * per_weight;
         }
         const size_t index = size_t(py) * size_t(width_) + size_t(px);
         if (!depth_pass_.counts().empty()) sums.points = depth_pass_.counts()[index];

@@ -35,6 +35,12 @@ public:
     }
 
 private:
+    // Whether something below a node may be left to the z-buffer. The bound of a child may exceed
+    // its parent's by a little (projectBox rounds far boxes up).
+    bool mayBeLarge(double max_triangle_area, double bound) const {
+        return projectedArea(max_triangle_area, bound) > 0.98 * settings_.large_triangle;
+    }
+
     void visitGroup(const Pending& p, std::vector<Pending>& opened) {
         const Group& group = scene_.groups[p.child.index()];
         const GroupNode& node = group.nodes[p.node];
@@ -42,8 +48,7 @@ private:
                                              p.camera_from_child.translation, node.bounds);
         if (!box.is_visible || !(node.area > 0.0)) return;
         const double bound = box.bound * maxAreaScale(p.camera_from_child.linear);
-        const bool has_large =
-            rasterize_all_ || node.max_triangle_area * bound > settings_.large_triangle;
+        const bool has_large = rasterize_all_ || mayBeLarge(node.max_triangle_area, bound);
         if (!has_large && box.size <= max_size_) {
             addBatch(p, box, node.area * bound);
             return;
@@ -65,8 +70,7 @@ private:
                                              p.camera_from_child.translation, mesh.nodes[0].bounds);
         if (!box.is_visible) return;
         const double area_scale = maxAreaScale(p.camera_from_child.linear);
-        if (rasterize_all_ ||
-            mesh.nodes[0].max_triangle_area * box.bound * area_scale > settings_.large_triangle) {
+        if (rasterize_all_ || mayBeLarge(mesh.nodes[0].max_triangle_area, box.bound * area_scale)) {
             collectLargeTriangles(p, mesh, area_scale);
         }
         if (!rasterize_all_) addMeshBatches(p, mesh, box, area_scale);
@@ -105,8 +109,7 @@ private:
                     continue;
                 }
             } else {
-                if (node.max_triangle_area * box.bound * area_scale <= settings_.large_triangle)
-                    continue;
+                if (!mayBeLarge(node.max_triangle_area, box.bound * area_scale)) continue;
                 const NodeClass node_class = classifyNode(node, box, area_scale, settings_);
                 if (node_class == NodeClass::kLargeTriangles) addRange(range_begin, node);
                 if (node_class != NodeClass::kOpen) continue;

@@ -4,8 +4,6 @@
 #include <core/rng.h>
 #include <scenegraph/object_id.h>
 
-#include <bit>
-
 namespace stipple {
 
 void GroupPoints::draw(ChildRef ref, uint32_t node_index, const Affine& camera_from_group,
@@ -117,8 +115,7 @@ double instanceBound(const View& view, const InstanceFrame& frame, const Box3& b
 
 }  // namespace
 
-// Some points of a whole mesh or of a group's node within a far group: an aligned piece of its
-// list, another one for each instance, so that equal trees do not show equal points.
+// Some points of a whole mesh or of a group's node within a far group.
 void GroupPoints::drawList(const Affine& camera_from_child, ChildRef child, uint32_t node,
                            uint64_t path, double scale, uint32_t count) {
     if (count == 0) return;
@@ -134,10 +131,7 @@ void GroupPoints::drawList(const Affine& camera_from_child, ChildRef child, uint
                                        hashCombine(context_.settings.seed, path, node)));
         density.drawn = needed;
     }
-    const uint32_t piece = std::max(16u, std::bit_ceil(count));
-    const uint32_t length = uint32_t(context_.settings.list_length);
-    const uint32_t first = piece * 2 <= length ? uint32_t(path >> 8) % (length / piece) * piece : 0;
-    points_.add(frame, child, node, density, first, count);
+    points_.add(frame, child, node, density, points_.firstOf(path, count), count);
 }
 
 }  // namespace stipple

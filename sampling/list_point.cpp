@@ -9,7 +9,10 @@ namespace stipple {
 
 double listPosition(const PointKey& key) {
     if (key.sampler == Sampler::kRandom) return uniformDouble(hashCombine(key.list, key.index));
-    const double t = double(reverseBits(key.index)) * 0x1p-32 + uniformDouble(key.list);
+    // Sixteen points in a row fall into sixteen strata, in an order of their own: a run of one
+    // point may lie anywhere, wherever in the sequence it begins.
+    const uint32_t order = uint32_t(hashCombine(key.list, key.index >> 4, 4)) << 28;
+    const double t = double(reverseBits(key.index) ^ order) * 0x1p-32 + uniformDouble(key.list);
     return t - std::floor(t);
 }
 

@@ -17,8 +17,8 @@ struct PointKey {
     uint32_t index = 0;
 };
 
-// Where point `index` lies along the cumulated areas, in [0, 1): van der Corput with a random
-// shift, or random.
+// Where point `index` lies along the cumulated areas, in [0, 1): van der Corput, scrambled and
+// shifted at random, or random.
 double listPosition(const PointKey& key);
 
 // Where on a mesh a point lies.

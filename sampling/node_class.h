@@ -33,7 +33,7 @@ inline NodeClass classifyNode(const MeshNode& node, const BoxProjection& box, do
     const bool is_leaf = node.child_count == 0;
     const bool is_mixed = node.stratum == kMixedStratum;
     const double bound = box.bound * area_scale;
-    const double largest = node.max_triangle_area * bound;
+    const double largest = projectedArea(node.max_triangle_area, bound);
     if (largest <= settings.area_threshold) {
         const double n = settings.samples * bound * node.area;
         const bool fits =

@@ -94,14 +94,16 @@ void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
     budget_ = budget_bytes;
     const bool is_new = !(identity == identity_);
     identity_ = identity;
-    if (is_new || bytes_ > budget_) {
+    const auto drop = [&](bool also_used) {
         forEachSlot([&](Slot& slot) {
             List* list = slot.list.load();
-            if (!list || (!is_new && budget_ > 0 && slot.last_used.load() == frame_)) return;
+            if (!list || (!also_used && slot.last_used.load() == frame_)) return;
             bytes_ -= list->block_count * sizeof(ListBlock);
             delete slot.list.exchange(nullptr);
         });
-    }
+    };
+    if (is_full_.exchange(false)) drop(false);
+    if (is_new || bytes_ > budget_) drop(true);
     ++frame_;
 }
 
@@ -207,7 +209,10 @@ PointLists::List* PointLists::grow(Slot& slot, ChildRef child, uint32_t node, ui
     uint32_t capacity = 1;
     while (capacity < n_blocks) capacity *= 2;
     const size_t added = capacity * sizeof(ListBlock);
-    if (bytes_.load(std::memory_order_relaxed) + added > budget_) return nullptr;
+    if (bytes_.load(std::memory_order_relaxed) + added > budget_) {
+        is_full_.store(true, std::memory_order_relaxed);
+        return nullptr;
+    }
     bytes_ += added;
     auto list = std::make_unique<List>();
     list->block_count = capacity;

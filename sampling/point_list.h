@@ -18,7 +18,7 @@ namespace stipple {
 // Patch widths of list points are codes of metres from 2^this.
 inline constexpr int kFirstMetreExponent = -14;
 
-// 64 points, quantized to the node's box: 20 bytes each, those that drawing reads first.
+// 64 points, quantized to the node's box: 14 bytes each that drawing reads, then what is looked up.
 struct ListBlock {
     alignas(64) uint16_t position[3][kBlockPoints];  // box.min + box.extent * q / 65535
     int16_t normal[3][kBlockPoints];                 // geometric, times 32767 x the density that it
@@ -55,8 +55,9 @@ public:
     // Meshes have lists, and innermost groups with many instances of their own: one list serves
     // all.
     bool hasLists(ChildRef child) const { return !slotsOf(child).empty(); }
-    // Call between frames: sets the identity (a new one empties the cache) and the budget; above
-    // it, lists that were not used in the last frame are dropped.
+    // Call between frames: sets the identity (a new one empties the cache) and the budget. Where
+    // it did not suffice, lists that were not used in the last frame are dropped; where it has
+    // become smaller than what is there, all are.
     void startFrame(const ListIdentity& identity, size_t budget_bytes);
     // Points [first, first + count) of a node's sequence, which must not cross a multiple of 64:
     // lanes [first_lane, first_lane + count) of the block returned. From the cache, which first
@@ -90,6 +91,7 @@ private:
     ListIdentity identity_;
     size_t budget_ = 0;
     std::atomic<size_t> bytes_{0};
+    std::atomic<bool> is_full_{false};  // a list was refused in this frame
     uint32_t frame_ = 0;
     std::mutex mutex_;  // guards retired_
     std::vector<std::unique_ptr<List>> retired_;

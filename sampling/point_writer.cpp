@@ -28,6 +28,7 @@ KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, 
     params.orthographic = view.orthographic;
     params.facing = Vec3(frame.facing);
     params.z_near = view.near_z;
+    params.z_far = view.far_z;
     params.random = context.settings.sampler == Sampler::kRandom;
     params.hash = uint32_t(hashCombine(context.settings.seed, frame.path, node_index, 2));
     // The probability to keep a point is K * prj / density.
@@ -58,6 +59,10 @@ void PointWriter::add(const InstanceFrame& frame, ChildRef child, uint32_t node,
     while (count > 0) {
         const uint32_t n = std::min(count, kBlockPoints - first % kBlockPoints);
         if (block_.count + int(n) > kBlockPoints) flush();
+        if (context_.nextNumber() >= kTriangleBit) {
+            throw Error(ErrorCode::kUnsupported, "",
+                        "too many points in one tile: take fewer samples or smaller tiles");
+        }
         if (block_.count == 0) first_run_ = context_.runs.size();
         int lane;
         const ListBlock& list =
@@ -70,6 +75,15 @@ void PointWriter::add(const InstanceFrame& frame, ChildRef child, uint32_t node,
         first += n;
         count -= n;
     }
+}
+
+uint32_t PointWriter::firstOf(uint64_t path, uint32_t count) const {
+    const RenderSettings& settings = context_.settings;
+    const uint64_t hash = hashCombine(settings.seed, path, 5);
+    if (settings.sampler == Sampler::kRandom) return uint32_t(hash);
+    const uint32_t piece = std::max(16u, std::bit_ceil(count)),
+                   length = uint32_t(settings.list_length);
+    return piece * 2 <= length ? uint32_t(hash % (length / piece)) * piece : 0;
 }
 
 void PointWriter::flush() {

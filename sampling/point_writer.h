@@ -23,6 +23,9 @@ public:
     // is a multiple of 16, unless the sampler is random.
     void add(const InstanceFrame& frame, ChildRef child, uint32_t node, const RunDensity& density,
              uint32_t first, uint32_t count);
+    // Where in a list an instance that needs few points begins: an aligned piece, another one for
+    // each instance, so that equal trees do not show equal points.
+    uint32_t firstOf(uint64_t path, uint32_t count) const;
     // Hands over what has gathered.
     void flush();
 

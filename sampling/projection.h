@@ -23,6 +23,11 @@ struct BoxProjection {
                          // its orientation
 };
 
+// The largest projection of `area` under a bound; infinite near the eye, even where the area is 0.
+inline double projectedArea(double area, double bound) {
+    return bound < std::numeric_limits<double>::infinity() ? area * bound : bound;
+}
+
 // p_camera = linear * p + translation for p in the box.
 BoxProjection projectBox(const View& view, const DMat3& linear, const DVec3& translation,
                          const Box3& box);

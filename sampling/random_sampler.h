@@ -28,8 +28,7 @@ private:
     FramePlan plan_;
 };
 
-// Attributes of a rasterized triangle `number` of the plan at subpixel coordinates; sets
-// position_camera too.
+// Attributes of a rasterized triangle `number` of the plan at subpixel coordinates.
 void rasterAttributes(const Scene& scene, const View& view, const FramePlan& plan, uint32_t number,
                       float sub_x, float sub_y, SurfaceSample& sample);
 

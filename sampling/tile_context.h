@@ -33,6 +33,7 @@ struct TileContext {
     std::vector<Run> runs;
     std::vector<InstanceFrame> triangle_frames;
 
+    // Below kTriangleBit.
     uint32_t nextNumber() const { return uint32_t(runs.size()) * kBlockPoints; }
     const Run& runOf(uint32_t number) const { return runs[(number & ~kKindBits) / kBlockPoints]; }
 };

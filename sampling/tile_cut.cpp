@@ -132,10 +132,11 @@ bool TileCut::drawAsPoints(ChildRef ref, uint32_t node_index, const Affine& came
     if (node.max_triangle_area * bound > settings.area_threshold) return false;
     const double n = settings.samples * bound * node.area;
     if (box.size > kTileShare * float(settings.tile_size) && n > kFewPoints) return false;
-    const double most = kMostOverdraw * double(box.rect.width()) * double(box.rect.height());
+    const double area = double(std::max(box.size, 1.0f)) * double(std::max(box.thickness, 1.0f));
     RunDensity density;
     density.wanted = settings.samples;
-    const double overdraw = bound * node.area / most;
+    const double overdraw =
+        std::min(settings.samples, 1.0) * bound * node.area / (kMostOverdraw * area);
     if (overdraw > 1.0) {
         if (box.thickness > kThinNode) return false;
         density.wanted /= overdraw;
@@ -169,8 +170,12 @@ void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, uint
             density.drawn = settings.samples * box.bound * frame.area_scale;
             const uint64_t key = hashCombine(settings.seed, frame.path, mesh_index, node_index);
             const uint64_t count = roundAtRandom(std::min(density.drawn * node.area, 1e9), key);
-            const bool random = settings.sampler == Sampler::kRandom;
-            const uint32_t first = random ? uint32_t(mixBits(key)) : 0;
+            // Parts of a mesh are near and have many points; whole ones may have few.
+            const bool is_random = settings.sampler == Sampler::kRandom;
+            const uint32_t first =
+                node_index == 0 || is_random
+                    ? points_.firstOf(hashCombine(frame.path, node_index), uint32_t(count))
+                    : 0;
             points_.add(frame, ChildRef::mesh(mesh_index), node_index, density, first,
                         uint32_t(count));
             return;

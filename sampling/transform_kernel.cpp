@@ -25,7 +25,7 @@ inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
     const float bx = p.box_from_eye.x, by = p.box_from_eye.y, bz = p.box_from_eye.z;
     const float sx = p.step.x, sy = p.step.y, sz = p.step.z;
     const float fx = p.facing.x, fy = p.facing.y, fz = p.facing.z;
-    const float z_near = p.z_near, gain = p.gain;
+    const float z_near = p.z_near, z_far = p.z_far, gain = p.gain;
     const uint32_t hash = p.hash;
     const uint16_t* __restrict px = list.position[0] + first_lane;
     const uint16_t* __restrict py = list.position[1] + first_lane;
@@ -66,7 +66,7 @@ inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
         out_y[i] = y;
         out_z[i] = z;
         number[i] = first_number + uint32_t(i);
-        keep[i] = uint8_t((probability > threshold) & (z > z_near));
+        keep[i] = uint8_t((probability > threshold) & (z > z_near) & (z <= z_far));
     }
 }
 

@@ -17,8 +17,8 @@ struct KernelParams {
     Vec3 facing = Vec3(0);  // orthographic: object-space vector d with prj = f^2 |n.d|
     float gain = 0.0f;      // times |n.d| (/ z^3 in perspective; n is unit * 32767) this is the
                             // probability to keep a point
-    float z_near = 0.0f;    // nearer points are dropped
-    bool random = false;    // thinning numbers: hashed, or a golden-ratio sequence
+    float z_near = 0.0f, z_far = kInfinity;  // nearer and farther points are dropped
+    bool random = false;                     // thinning numbers: hashed, or a golden-ratio sequence
     uint32_t hash = 0;
     int width_offset = 0;  // takes width codes of metres to those of subpixels
     bool narrow = false;   // widths become kNoPatch

@@ -249,9 +249,9 @@ private:
             for (uint32_t t = begin; t < end; ++t) {
                 const UVec3& v = mesh_.triangles[t];
                 for (int k = 0; k < 3; ++k) node.bounds.extend(mesh_.positions[v[k]]);
+                // Not from the cumulated sums, in which small triangles beside large ones vanish.
                 node.max_triangle_area =
-                    std::max(node.max_triangle_area,
-                             float(mesh_.cumulative_area[t + 1] - mesh_.cumulative_area[t]));
+                    std::max(node.max_triangle_area, float(triangleArea(mesh_, v)));
             }
             node.area = mesh_.cumulative_area[end] - mesh_.cumulative_area[begin];
             mesh_.nodes[index] = node;

@@ -15,10 +15,10 @@ inline uint64_t extendObjectPath(uint64_t parent, uint32_t slot) {
     return hashCombine(parent, slot);
 }
 
-// The id that pictures carry; never 0, which means nothing.
+// The id that pictures carry; never 0, which means nothing, nor in the 24 bits that a float keeps.
 inline uint32_t objectId(uint64_t path) {
     const uint32_t id = uint32_t(path >> 32);
-    return id != 0 ? id : 1u;
+    return (id & 0xffffffu) != 0 ? id : id | 1u;
 }
 
 }  // namespace stipple

@@ -20,11 +20,17 @@ namespace stipple {
 
 namespace {
 
-constexpr std::array kSupportedExtensions = {
-    "EXT_mesh_gpu_instancing",    "EXT_meshopt_compression", "EXT_texture_webp",
-    "KHR_draco_mesh_compression", "KHR_lights_punctual",     "KHR_materials_emissive_strength",
-    "KHR_materials_specular",     "KHR_materials_unlit",     "KHR_mesh_quantization",
-    "KHR_texture_transform"};
+constexpr std::array kSupportedExtensions = {"EXT_mesh_gpu_instancing",
+                                             "EXT_meshopt_compression",
+                                             "EXT_texture_webp",
+                                             "KHR_materials_diffuse_transmission",
+                                             "KHR_draco_mesh_compression",
+                                             "KHR_lights_punctual",
+                                             "KHR_materials_emissive_strength",
+                                             "KHR_materials_specular",
+                                             "KHR_materials_unlit",
+                                             "KHR_mesh_quantization",
+                                             "KHR_texture_transform"};
 
 struct Container {
     std::string_view json;

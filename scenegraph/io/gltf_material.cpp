@@ -114,6 +114,17 @@ Material GltfMaterials::convert(const tinygltf::Material& source, bool for_point
     m.alpha_cutoff = float(source.alphaCutoff);
     m.double_sided = source.doubleSided;
     m.unlit = extension(source.extensions, "KHR_materials_unlit") != nullptr;
+    if (const auto* through = extension(source.extensions, "KHR_materials_diffuse_transmission")) {
+        m.translucency = float(numberOf(*through, "diffuseTransmissionFactor", 0.0));
+        if (through->Has("diffuseTransmissionTexture")) {
+            const std::string place = path +
+                                      ".extensions.KHR_materials_diffuse_transmission."
+                                      "diffuseTransmissionTexture";
+            const int index =
+                through->Get("diffuseTransmissionTexture").Get("index").GetNumberAsInt();
+            m.translucency *= mean(index, false, place).a;
+        }
+    }
 
     m.base_color = Vec3(pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]);
     Vec3 mean_base = m.base_color;

@@ -30,7 +30,7 @@ private:
 };
 
 // Estimates of what one costs once built, with the transient costs of building it.
-inline constexpr double kBytesPerInstance = 40.0;
+inline constexpr double kBytesPerInstance = 110.0;
 inline constexpr double kBytesPerTriangle = 80.0;
 inline constexpr double kBytesPerVertex = 48.0;
 

@@ -78,6 +78,10 @@ public:
                 parseLine();
             }
         }
+        if (!joined_.empty()) {
+            line_ = joined_;
+            parseLine();
+        }
         checkLargest(largest_[0], out_.positions.size(), "v");
         checkLargest(largest_[1], out_.uvs.size(), "vt");
         checkLargest(largest_[2], out_.normals.size(), "vn");
@@ -105,10 +109,11 @@ private:
         if (word[0] == '+') word.remove_prefix(1);
         double value = 0.0;
         const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-        if ((error != std::errc() && error != std::errc::result_out_of_range) ||
-            end != word.data() + word.size())
+        const bool is_range = error == std::errc::result_out_of_range;
+        if ((error != std::errc() && !is_range) || end != word.data() + word.size())
             fail(ErrorCode::kParse, inQuotes(word) + " is no number");
-        if (!(std::abs(value) <= 1e15))  // areas stay finite
+        if (is_range) value = std::strtod(std::string(word).c_str(), nullptr);  // 0 or infinite
+        if (!(std::abs(value) <= 1e15))                                         // areas stay finite
             fail(ErrorCode::kInvalidScene, inQuotes(word) + " is beyond 1e15 or not finite");
         return float(value);
     }
@@ -229,8 +234,8 @@ private:
         }
         has_library_ |= is_loaded;
         if (!is_loaded) {
-            context_.warnOnce(place(), "MTL file " + inQuotes(names) +
-                                           " cannot be opened; drawn without its materials");
+            context_.warnOnce(where_, "MTL file " + inQuotes(names) +
+                                          " cannot be opened; drawn without its materials");
         }
     }
 

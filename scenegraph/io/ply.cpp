@@ -110,13 +110,14 @@ private:
         if (*at_ == '+') ++at_;
         double value = 0.0;
         const auto [end, error] = std::from_chars(at_, end_, value);
-        const bool is_range = error == std::errc::result_out_of_range;  // 1e-400 reads as 0
+        const bool is_range = error == std::errc::result_out_of_range;
         if ((error != std::errc() && !is_range) || (end < end_ && !isSpace(*end))) {
             const char* word_end = at_;
             while (word_end < end_ && !isSpace(*word_end)) ++word_end;
             fail(element, index,
                  inQuotes(std::string_view(at_, size_t(word_end - at_))) + " is no number");
         }
+        if (is_range) value = std::strtod(std::string(at_, end).c_str(), nullptr);  // 0, infinite
         at_ = end;
         return value;
     }

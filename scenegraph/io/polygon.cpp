@@ -52,13 +52,14 @@ void triangulatePolygon(const std::vector<Vec3>& positions, std::span<const uint
                        p[other] != p[b] && p[other] != p[c] && isInside(p[other], p[a], p[b], p[c]);
             });
         };
+        // The second corner first: what is convex becomes the fan from the first corner. Then on
+        // from the last ear, or hostile polygons would take cubic time.
+        size_t ear = 1;
         while (left.size() > 3) {
-            // The second corner first: what is convex becomes the fan from the first corner.
-            size_t ear = 1;
-            while (ear < left.size() && !isEar(ear)) ++ear;
-            if (ear == left.size() && isEar(0)) ear = 0;
-            if (ear == left.size()) break;  // it cuts itself
             const size_t n = left.size();
+            size_t tried = 0;
+            for (ear %= n; tried < n && !isEar(ear); ++tried) ear = (ear + 1) % n;
+            if (tried == n) break;  // it cuts itself
             triangles.emplace_back(polygon[left[(ear + n - 1) % n]], polygon[left[ear]],
                                    polygon[left[(ear + 1) % n]]);
             left.erase(left.begin() + std::ptrdiff_t(ear));

@@ -202,7 +202,9 @@ std::filesystem::path SceneReader::file(const Json& value, const JsonPath& path)
 DVec3 readDirection(const SceneReader& reader, const Json& object, const DVec3& from,
                     const JsonPath& path) {
     if (object.contains("target") == object.contains("direction"))
-        reader.fail(path, "needs either target or direction");
+        reader.fail(path, object.contains("target")
+                              ? "has both target and direction, which contradict each other"
+                              : "needs target or direction");
     const bool has_target = object.contains("target");
     DVec3 v(0);
     readVector(object, has_target ? "target" : "direction", v);

@@ -59,7 +59,8 @@ inline uint8_t patchWidthCode(float width, int first_exponent) {
         int(std::bit_cast<uint32_t>(width) >> 20) - ((127 + first_exponent) * kWidthsPerOctave);
     return uint8_t(std::clamp(bits, 1, kWidthCodes - 1));
 }
-// In subpixels. Code 0, kNoPatch, is kept for points that cover just the subpixel they lie in.
+// In subpixels. Code 0, kNoPatch, is kept for points that cover no more than the subpixel they lie
+// in, or 1/K of it.
 inline constexpr int kFirstSubpixelExponent = -8;
 inline constexpr uint8_t kNoPatch = 0;
 

@@ -245,5 +245,25 @@ TEST(SamplingUniform, everyStratifiedPrefixIsWellSpread) {
     }
 }
 
+// Far instances take short aligned pieces of a list: each piece's first point may lie anywhere, and
+// sixteen points in a row lie in sixteen different parts of the area.
+TEST(SamplingUniform, shortPiecesOfAListLieAnywhere) {
+    std::vector<double> first(16, 0.0);
+    constexpr uint32_t kPieces = 1600;
+    for (uint32_t piece = 0; piece < kPieces; ++piece) {
+        std::vector<int> parts(16, 0);
+        // The random shift moves all points alike, so parts are counted from where it begins.
+        const double begin = uniformDouble(99);
+        for (uint32_t i = 0; i < 16; ++i) {
+            double t = listPosition({Sampler::kStratified, 99, piece * 16 + i}) - begin;
+            t -= std::floor(t);
+            ++parts[size_t(t * 16.0)];
+            if (i == 0) ++first[size_t(t * 16.0)];
+        }
+        EXPECT_EQ(std::count(parts.begin(), parts.end(), 1), 16) << piece;
+    }
+    EXPECT_LT(chiSquare(first, std::vector<double>(16, kPieces / 16.0)), criticalValue(15));
+}
+
 }  // namespace
 }  // namespace stipple

@@ -270,8 +270,7 @@ TEST(IoSceneLights, readsPointsAndSpots) {
     const std::pair<const char*, const char*> wrong[] = {
         {R"({"points": [{"intensity": [1, 1, 1]}]})", "/lights/points/0"},
         {R"({"points": [{"position": [0, 0, 0], "range": -1}]})", "/lights/points/0/range"},
-        {R"({"spots": [{"position": [0, 0, 0]}]})",
-         "/lights/spots/0: needs either target or direction"},
+        {R"({"spots": [{"position": [0, 0, 0]}]})", "/lights/spots/0: needs target or direction"},
         {R"({"spots": [{"position": [0, 0, 0], "target": [0, 0, 0]}]})",
          "/lights/spots/0/target: the vector is zero"},
         {R"({"spots": [{"position": [0, 0, 0], "direction": [0, 1, 0], "inner_cone": 50}]})",
