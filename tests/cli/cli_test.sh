@@ -283,12 +283,15 @@ case_same_bits_for_any_threads() {
     cmp 1.png cached.png || fail "the cached picture differs"
 }
 
-# Waits until process $1 has a handler for SIGTERM: before, a signal says nothing about the program.
+# Waits until process $1 is the program and catches both signals: before, a signal says nothing about the
+# program (between fork and exec the shell's own handlers show, and a background job ignores SIGINT).
 wait_for_handler() {
     local caught=0
     for ((i = 0; i < 600; ++i)); do
-        caught=$(sed -n 's/^SigCgt:\t//p' "/proc/$1/status" 2>/dev/null)
-        (((0x${caught:-0} >> 14) & 1)) && return
+        if [[ /proc/$1/exe -ef $stipple ]]; then
+            caught=$(sed -n 's/^SigCgt:\t//p' "/proc/$1/status" 2>/dev/null)
+            (((0x${caught:-0} & 0x4002) == 0x4002)) && return
+        fi
         sleep 0.1
     done
     fail "it catches no signals"
