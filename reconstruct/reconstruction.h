@@ -16,7 +16,7 @@
 namespace stipple {
 
 // Looks up what a number stands for. sub_x, sub_y: where it is seen, subpixel coordinates. Fills
-// all but depth.
+// all but depth and position.
 class SampleLookup {
 public:
     virtual ~SampleLookup() = default;

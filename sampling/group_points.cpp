@@ -43,7 +43,7 @@ void GroupPoints::sweep(ChildRef ref, uint32_t node_index, const Affine& camera_
     for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
         const ChildRef child = group.instances.child(i);
         const double child_scale = scale * group.instances.areaScale(i);
-        const double end = base + childArea(child) * child_scale;
+        const double end = base + childArea(context_.scene, child) * child_scale;
         const uint64_t count = pointsBefore(end) - pointsBefore(base);
         if (count > 0) {
             const Affine camera_from_child = camera_from_group * group.instances.groupFromChild(i);
@@ -66,11 +66,6 @@ void GroupPoints::sweep(ChildRef ref, uint32_t node_index, const Affine& camera_
 
 uint64_t GroupPoints::pointsBefore(double position) const {
     return uint64_t(std::max(0.0, std::ceil(position / spacing_ - phase_)));
-}
-
-double GroupPoints::childArea(ChildRef child) const {
-    return child.isGroup() ? context_.scene.groups[child.index()].area
-                           : context_.scene.meshes[child.index()].area;
 }
 
 RunDensity GroupPoints::childDensity(double scale) const {
@@ -119,13 +114,11 @@ double instanceBound(const View& view, const InstanceFrame& frame, const Box3& b
 void GroupPoints::drawList(const Affine& camera_from_child, ChildRef child, uint32_t node,
                            uint64_t path, double scale, uint32_t count) {
     if (count == 0) return;
-    const Scene& scene = context_.scene;
     const InstanceFrame frame = makeInstanceFrame(camera_from_child, path);
     // The group's node was drawn for its nearest corner; this instance may need fewer.
     RunDensity density = childDensity(scale);
-    const Box3& bounds = child.isGroup() ? scene.groups[child.index()].nodes[node].bounds
-                                         : scene.meshes[child.index()].nodes[node].bounds;
-    const double needed = density.wanted * instanceBound(context_.view, frame, bounds);
+    const double needed = density.wanted * instanceBound(context_.view, frame,
+                                                         nodeBounds(context_.scene, child, node));
     if (needed < density.drawn) {
         count = uint32_t(roundAtRandom(count * (needed / density.drawn),
                                        hashCombine(context_.settings.seed, path, node)));

@@ -24,7 +24,6 @@ private:
                  double scale, double position, uint32_t index);
     void drawList(const Affine& camera_from_child, ChildRef child, uint32_t node, uint64_t path,
                   double scale, uint32_t count);
-    double childArea(ChildRef child) const;
     uint64_t pointsBefore(double position) const;
     // Where `scale` carries areas of a child to the node that is drawn.
     RunDensity childDensity(double scale) const;

@@ -90,9 +90,7 @@ InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node_i
     const uint32_t end = node->first + node->resident_count;
     for (uint32_t i = node->first;; ++i) {
         const ChildRef child = group.instances.child(i);
-        const double child_area =
-            child.isGroup() ? scene.groups[child.index()].area : scene.meshes[child.index()].area;
-        const double area = child_area * group.instances.areaScale(i);
+        const double area = childArea(scene, child) * group.instances.areaScale(i);
         if (target < area || i + 1 >= end)
             return {i, area > 0.0 ? std::clamp(target / area, 0.0, 0x1.fffffep-1) : 0.0};
         target -= area;

@@ -195,8 +195,7 @@ void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
 
 void PointLists::makePoints(ChildRef child, uint32_t node, uint32_t first, int count,
                             ListBlock& out) const {
-    const Box3& box = child.isGroup() ? scene_.groups[child.index()].nodes[node].bounds
-                                      : scene_.meshes[child.index()].nodes[node].bounds;
+    const Box3& box = nodeBounds(scene_, child, node);
     PointKey key{identity_.sampler, hashCombine(identity_.seed, child.bits, node), first};
     for (int lane = 0; lane < count; ++lane, ++key.index)
         writePoint(makePoint(scene_, child, node, key), box, lane, out);

@@ -18,9 +18,7 @@ uint32_t listLength(uint64_t end) {
 KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, ChildRef child,
                         uint32_t node_index, const RunDensity& density) {
     const View& view = context.view;
-    const Box3& bounds = child.isGroup()
-                             ? context.scene.groups[child.index()].nodes[node_index].bounds
-                             : context.scene.meshes[child.index()].nodes[node_index].bounds;
+    const Box3& bounds = nodeBounds(context.scene, child, node_index);
     KernelParams params;
     params.box_from_eye = Vec3(DVec3(bounds.min) - frame.eye_object);
     params.step = bounds.extent() / 65535.0f;

@@ -23,12 +23,9 @@ void TileCut::emit(const Batch& batch, PointSink& sink) {
     const PlannedNode& planned = plan_.nodes[batch.index];
     const Affine& camera_from_child = planned.camera_from_child;
     context_.sink = &sink;
-    const Scene& scene = context_.scene;
-    const Box3& bounds = planned.child.isGroup()
-                             ? scene.groups[planned.child.index()].nodes[planned.node].bounds
-                             : scene.meshes[planned.child.index()].nodes[planned.node].bounds;
     const BoxProjection box =
-        projectBox(context_.view, camera_from_child.linear, camera_from_child.translation, bounds);
+        projectBox(context_.view, camera_from_child.linear, camera_from_child.translation,
+                   nodeBounds(context_.scene, planned.child, planned.node));
     if (planned.child.isGroup()) {
         drawGroupNode(planned.child, planned.node, camera_from_child, planned.path, box);
     } else {

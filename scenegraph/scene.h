@@ -32,6 +32,15 @@ struct Scene {
     const Camera* findCamera(const std::string& name) const;
 };
 
+// Of an instance's child, which has been built.
+inline double childArea(const Scene& scene, ChildRef child) {
+    return child.isGroup() ? scene.groups[child.index()].area : scene.meshes[child.index()].area;
+}
+inline const Box3& nodeBounds(const Scene& scene, ChildRef child, uint32_t node) {
+    return child.isGroup() ? scene.groups[child.index()].nodes[node].bounds
+                           : scene.meshes[child.index()].nodes[node].bounds;
+}
+
 // Builds every mesh's and group's octree and sums, children before parents. Throws kInvalidScene
 // for a group that contains itself (naming the cycle), singular or non-finite transforms, indices
 // out of range.

@@ -124,7 +124,7 @@ public:
     virtual void forget() = 0;
 };
 
-// Anything that can plan and emit points.
+// What has planned points and makes emitters of them, one a thread.
 class PointSource {
 public:
     virtual ~PointSource() = default;

@@ -19,7 +19,8 @@ set(libraries
   "^GL/"               "^src/raster/"
   "^OpenImageIO/"      "^(src/core|scenegraph/io)/"
   "^(tbb|oneapi)/"     "^src/core/parallel\\.cpp$"
-  "^tiny_gltf"         "^scenegraph/io/"
+  "^(tiny_gltf|tiny_obj_loader|draco/|meshoptimizer|nanoflann|Eigen/|valijson/)" "^scenegraph/io/"
+  "^nlohmann/"         "^(scenegraph/io|src/tools)/"
   "^CLI/"              "^src/tools/")
 
 function(check_file folder path)
