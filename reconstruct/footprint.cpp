@@ -12,8 +12,9 @@ Footprint makeFootprint(float width, float k) {
     if (k < density) {
         // Too few points for footprints of one subpixel.
         const float at_one = std::max(0.0f, width - 0.6f) / (width + 8.5f);
-        footprint.wide_share =
-            std::min(1.0f, at_one * (density - k) / std::max(density - 1.0f, 1e-3f));
+        const float closing = at_one * (density - k) / std::max(density - 1.0f, 1e-3f);
+        // Below one point a subpixel each must stand for more than the one it lies in.
+        footprint.wide_share = std::min(1.0f, std::max(closing, (1.0f / k - 1.0f) / 3.0f));
         return footprint;
     }
     // k side^2 = balancedDensity(width / side); the left side grows with the side, the right side

@@ -105,7 +105,7 @@ private:
             for (int x = rect.x0; x < rect.x1; ++x) {
                 const uint64_t key = tile_.row(y)[x];
                 const uint32_t number = DepthTile::numberOf(key);
-                if (number == kNoNumber || !(number & kKindBits)) continue;
+                if (number == kNoNumber || !(number & kAnyTriangle)) continue;
                 const Vec2 p(float(x) + 0.5f, float(y) + 0.5f);
                 SurfaceSample sample;
                 sample.depth = DepthTile::depthOf(key);

@@ -20,20 +20,21 @@ bool fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
             const float here = DepthTile::depthOf(*c);
             const uint64_t around[8] = {c[-w - 1], c[-w], c[-w + 1], c[1],
                                         c[w + 1],  c[w],  c[w - 1],  c[-1]};
-            int in_front = 0;
+            int in_front = 0, on_surface = 0;
             uint64_t nearest = DepthTile::kEmpty;
             float nearest_depth = kInfinity, farthest_front = 0.0f;
             for (const uint64_t key : around) {
                 const float d = DepthTile::depthOf(key);
                 if (d * 1.02f < here) {
                     ++in_front;
+                    on_surface += (DepthTile::numberOf(key) & kKindBits) == kSurfaceBit;
                     farthest_front = std::max(farthest_front, d);
                     if (d < nearest_depth) nearest_depth = d, nearest = key;
                 }
             }
             // All but one, and they agree on one depth within what a slanted surface spans over
-            // three subpixels.
-            if (in_front >= 7 && farthest_front < nearest_depth * 1.02f) {
+            // three subpixels. Triangles have no holes, and gaps between leaves are none.
+            if (in_front >= 7 && on_surface >= 4 && farthest_front < nearest_depth * 1.02f) {
                 tile.keys()[size_t(y) * size_t(w) + size_t(x)] =
                     DepthTile::pack(farthest_front, DepthTile::numberOf(nearest));
                 is_changed = true;
@@ -110,7 +111,7 @@ private:
             return;
         }
         // Neighbours often show the same point.
-        if (number != last_number_ || (number & kKindBits)) {
+        if (number != last_number_ || (number & kAnyTriangle)) {
             last_.depth = DepthTile::depthOf(key);
             const float sub_x = float(x) + 0.5f, sub_y = float(y) + 0.5f;
             Vec3 origin, direction;

@@ -88,7 +88,7 @@ void GroupPoints::drawOne(ChildRef ref, uint32_t node, const Affine& camera_from
     if (child.isGroup()) {
         drawOne(child, 0, camera_from_child, child_path, child_scale, at.position, index);
     } else {
-        points_.add(makeInstanceFrame(camera_from_child, child_path), child, 0,
+        points_.add(makeInstanceFrame(camera_from_child, child_path), {child, 0},
                     childDensity(child_scale), index, 1);
     }
 }
@@ -119,12 +119,18 @@ void GroupPoints::drawList(const Affine& camera_from_child, ChildRef child, uint
     RunDensity density = childDensity(scale);
     const double needed = density.wanted * instanceBound(context_.view, frame,
                                                          nodeBounds(context_.scene, child, node));
+    double n = count;
     if (needed < density.drawn) {
-        count = uint32_t(roundAtRandom(count * (needed / density.drawn),
-                                       hashCombine(context_.settings.seed, path, node)));
+        n *= needed / density.drawn;
         density.drawn = needed;
     }
-    points_.add(frame, child, node, density, points_.firstOf(path, count), count);
+    if (!child.isGroup()) {
+        const SeenMesh seen = seeMesh(context_, frame, child.index(), density.drawn);
+        addMeshPoints(context_, points_, frame, child.index(), node, seen, density, n);
+        return;
+    }
+    count = uint32_t(roundAtRandom(n, hashCombine(context_.settings.seed, path, node)));
+    points_.add(frame, {child, node}, density, points_.firstOf(path, count), count);
 }
 
 }  // namespace stipple

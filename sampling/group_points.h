@@ -4,7 +4,7 @@
 // et al. 2001 ("Dynamic Distribution Lists").
 #pragma once
 
-#include <sampling/point_writer.h>
+#include <sampling/mesh_points.h>
 
 namespace stipple {
 

@@ -16,17 +16,17 @@ double listPosition(const PointKey& key) {
     return t - std::floor(t);
 }
 
-MeshPoint meshPointAt(const Mesh& mesh, const MeshNode& node, double position,
+template <class T>
+MeshPoint meshPointAt(const std::vector<T>& cumulative_area, const MeshNode& node, double position,
                       const PointKey& key) {
-    const double* cumulative = mesh.cumulative_area.data();
+    const T* cumulative = cumulative_area.data();
     const uint32_t first = node.first_triangle, count = node.triangle_count;
-    const double begin = cumulative[first], area = cumulative[first + count] - begin;
+    const double begin = cumulative[first], area = double(cumulative[first + count]) - begin;
     const double target = begin + position * area;
-    const double* found =
-        std::upper_bound(cumulative + first + 1, cumulative + first + count, target);
+    const T* found = std::upper_bound(cumulative + first + 1, cumulative + first + count, target);
     MeshPoint p;
     p.triangle = uint32_t(found - cumulative) - 1;
-    const double triangle_area = cumulative[p.triangle + 1] - cumulative[p.triangle];
+    const double triangle_area = double(cumulative[p.triangle + 1]) - cumulative[p.triangle];
     double r = triangle_area > 0.0
                    ? std::clamp((target - cumulative[p.triangle]) / triangle_area, 0.0, 1.0)
                    : 0.0;
@@ -65,6 +65,10 @@ MeshPoint meshPointAt(const Mesh& mesh, const MeshNode& node, double position,
     p.u = uv.x, p.v = uv.y;
     return p;
 }
+
+template MeshPoint meshPointAt(const std::vector<double>&, const MeshNode&, double,
+                               const PointKey&);
+template MeshPoint meshPointAt(const std::vector<float>&, const MeshNode&, double, const PointKey&);
 
 InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node_index,
                          double position) {

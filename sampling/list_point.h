@@ -28,8 +28,11 @@ struct MeshPoint {
 };
 
 // The place at `position`, in [0, 1), along the areas of a mesh's node: uniform over its area if
-// the position is.
-MeshPoint meshPointAt(const Mesh& mesh, const MeshNode& node, double position, const PointKey& key);
+// the position is. cumulative_area: of the mesh's triangles, doubles (the whole area) or floats
+// (what is visible).
+template <class T>
+MeshPoint meshPointAt(const std::vector<T>& cumulative_area, const MeshNode& node, double position,
+                      const PointKey& key);
 
 // An instance below a group's node.
 struct InstancePoint {

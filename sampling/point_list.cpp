@@ -60,7 +60,8 @@ struct PointLists::List {
     std::unique_ptr<ListBlock[]> blocks;
 };
 
-PointLists::PointLists(const Scene& scene) : scene_(scene) {
+PointLists::PointLists(const Scene& scene)
+    : scene_(scene), seen_(scene.meshes.size() * kDirections) {
     constexpr uint32_t kOften = 8;
     std::vector<uint32_t> uses(scene.groups.size(), 0);
     for (const Group& group : scene.groups) {
@@ -78,6 +79,7 @@ PointLists::PointLists(const Scene& scene) : scene_(scene) {
 
 PointLists::~PointLists() {
     forEachSlot([](Slot& slot) { delete slot.list.load(); });
+    for (auto& seen : seen_) delete seen.load();
 }
 
 template <class Visit>
@@ -87,6 +89,37 @@ void PointLists::forEachSlot(const Visit& visit) {
             for (Slot& slot : slots) visit(slot);
         }
     }
+    for (auto& seen : seen_) {
+        if (!seen.load()) continue;
+        for (Slot& slot : seen.load()->slots) visit(slot);
+    }
+}
+
+PointLists::Seen& PointLists::seen(uint32_t mesh_index, int direction) {
+    std::atomic<Seen*>& place = seen_[mesh_index * kDirections + uint32_t(direction)];
+    if (Seen* seen = place.load(std::memory_order_acquire)) return *seen;
+    const std::lock_guard lock(
+        seen_stripes_[(mesh_index * kDirections + uint32_t(direction)) % kStripes]);
+    if (Seen* seen = place.load(std::memory_order_acquire)) return *seen;
+    const Mesh& mesh = scene_.meshes[mesh_index];
+    auto seen = std::make_unique<Seen>();
+    seen->area =
+        measureVisibleArea(mesh, scene_.materials, scene_.textures, directionOf(direction));
+    seen->slots = Slots(mesh.nodes.size());
+    visible_bytes_ +=
+        seen->area.cumulative.size() * sizeof(float) + mesh.nodes.size() * sizeof(Slot);
+    place.store(seen.get(), std::memory_order_release);
+    return *seen.release();
+}
+
+const VisibleArea& PointLists::visibleArea(uint32_t mesh, int direction) {
+    return seen(mesh, direction).area;
+}
+
+PointLists::Slot& PointLists::slotOf(const ListName& name) {
+    const uint32_t index = name.child.index();
+    if (name.direction != ListName::kWhole) return seen(index, name.direction).slots[name.node];
+    return (name.child.isGroup() ? group_slots_ : mesh_slots_)[index][name.node];
 }
 
 void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
@@ -123,9 +156,10 @@ struct Point {
 // A point of a full list stands for this much of the surface; textures are filtered to it.
 float listFootprint(double area) { return float(std::sqrt(area / double(kBlockPoints * 16))); }
 
-Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const MeshNode& node, double position,
-                    float footprint, const PointKey& key) {
-    const MeshPoint at = meshPointAt(mesh, node, position, key);
+template <class T>
+Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const std::vector<T>& cumulative_area,
+                    const MeshNode& node, double position, float footprint, const PointKey& key) {
+    const MeshPoint at = meshPointAt(cumulative_area, node, position, key);
     const UVec3& t = mesh.triangles[at.triangle];
     const Vec3 a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a, e2 = mesh.positions[t.z] - a;
     const MeshSurface surface =
@@ -154,7 +188,7 @@ Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, cons
     const Affine group_from_mesh = group.instances.groupFromChild(at.instance);
     const double area_scale = std::max(group.instances.areaScale(at.instance), 1e-30);
     const float length_scale = float(std::sqrt(area_scale));
-    Point p = makeMeshPoint(scene, mesh, mesh.nodes[0], at.position,
+    Point p = makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], at.position,
                             listFootprint(group.nodes[node].area) / length_scale, key);
     // Drawn for the largest area scale of the transform; this orientation's may be smaller.
     DMat3 area_map = cofactor(group_from_mesh.linear);
@@ -166,13 +200,6 @@ Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, cons
     p.patch_width *= length_scale;
     p.slot = group.listed_index[at.instance];
     return p;
-}
-
-Point makePoint(const Scene& scene, ChildRef child, uint32_t node, const PointKey& key) {
-    if (child.isGroup()) return makeGroupPoint(scene, scene.groups[child.index()], node, key);
-    const Mesh& mesh = scene.meshes[child.index()];
-    return makeMeshPoint(scene, mesh, mesh.nodes[node], listPosition(key),
-                         listFootprint(mesh.nodes[node].area), key);
 }
 
 void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
@@ -193,16 +220,38 @@ void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
 
 }  // namespace
 
-void PointLists::makePoints(ChildRef child, uint32_t node, uint32_t first, int count,
-                            ListBlock& out) const {
-    const Box3& box = nodeBounds(scene_, child, node);
-    PointKey key{identity_.sampler, hashCombine(identity_.seed, child.bits, node), first};
-    for (int lane = 0; lane < count; ++lane, ++key.index)
-        writePoint(makePoint(scene_, child, node, key), box, lane, out);
+void PointLists::makePoints(const ListName& name, uint32_t first, int count, ListBlock& out) {
+    const Box3& box = nodeBounds(scene_, name.child, name.node);
+    const bool is_whole = name.direction == ListName::kWhole;
+    PointKey key{identity_.sampler, hashCombine(identity_.seed, name.child.bits, name.node), first};
+    if (!is_whole) key.list = hashCombine(key.list, uint64_t(name.direction), 6);
+    const auto makeAll = [&](const auto& make) {
+        for (int lane = 0; lane < count; ++lane, ++key.index) writePoint(make(), box, lane, out);
+    };
+    if (name.child.isGroup()) {
+        const Group& group = scene_.groups[name.child.index()];
+        makeAll([&] { return makeGroupPoint(scene_, group, name.node, key); });
+        return;
+    }
+    const Mesh& mesh = scene_.meshes[name.child.index()];
+    const MeshNode& node = mesh.nodes[name.node];
+    const auto makeOn = [&](const auto& cumulative_area, double area) {
+        const float footprint = listFootprint(area);
+        makeAll([&] {
+            return makeMeshPoint(scene_, mesh, cumulative_area, node, listPosition(key), footprint,
+                                 key);
+        });
+    };
+    if (is_whole) {
+        makeOn(mesh.cumulative_area, node.area);
+    } else {
+        const VisibleArea& visible = visibleArea(name.child.index(), name.direction);
+        makeOn(visible.cumulative, visible.area(node));
+    }
 }
 
-PointLists::List* PointLists::grow(Slot& slot, ChildRef child, uint32_t node, uint32_t n_blocks) {
-    const std::lock_guard lock(stripes_[(child.bits * 31 + node) % kStripes]);
+PointLists::List* PointLists::grow(Slot& slot, const ListName& name, uint32_t n_blocks) {
+    const std::lock_guard lock(stripes_[(name.child.bits * 31 + name.node) % kStripes]);
     List* old = slot.list.load(std::memory_order_acquire);
     if (old && old->block_count >= n_blocks) return old;
     uint32_t capacity = 1;
@@ -219,7 +268,7 @@ PointLists::List* PointLists::grow(Slot& slot, ChildRef child, uint32_t node, ui
     const uint32_t have = old ? old->block_count : 0;
     if (old) std::memcpy(list->blocks.get(), old->blocks.get(), have * sizeof(ListBlock));
     for (uint32_t b = have; b < capacity; ++b)
-        makePoints(child, node, b * kBlockPoints, kBlockPoints, list->blocks[b]);
+        makePoints(name, b * kBlockPoints, kBlockPoints, list->blocks[b]);
     List* result = list.release();
     slot.list.store(result, std::memory_order_release);
     if (old) {
@@ -231,14 +280,14 @@ PointLists::List* PointLists::grow(Slot& slot, ChildRef child, uint32_t node, ui
     return result;
 }
 
-const ListBlock& PointLists::points(ChildRef child, uint32_t node, uint32_t first, int count,
+const ListBlock& PointLists::points(const ListName& name, uint32_t first, int count,
                                     uint32_t list_length, ListBlock& scratch, int& first_lane) {
     const uint32_t block = first / kBlockPoints;
     if (budget_ > 0 && first < list_length) {
-        Slot& slot = slotsOf(child)[node];
+        Slot& slot = slotOf(name);
         List* list = slot.list.load(std::memory_order_acquire);
         if (!list || list->block_count <= block) {
-            list = grow(slot, child, node, (list_length + kBlockPoints - 1) / kBlockPoints);
+            list = grow(slot, name, (list_length + kBlockPoints - 1) / kBlockPoints);
         }
         if (list) {
             if (slot.last_used.load(std::memory_order_relaxed) != frame_) {
@@ -248,7 +297,7 @@ const ListBlock& PointLists::points(ChildRef child, uint32_t node, uint32_t firs
             return list->blocks[block];
         }
     }
-    makePoints(child, node, first, count, scratch);
+    makePoints(name, first, count, scratch);
     first_lane = 0;
     return scratch;
 }

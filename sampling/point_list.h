@@ -8,6 +8,7 @@
 
 #include <core/points.h>
 #include <sampling/list_point.h>
+#include <scenegraph/visible_area.h>
 
 #include <atomic>
 #include <memory>
@@ -47,6 +48,15 @@ struct ListIdentity {
     bool operator==(const ListIdentity&) const = default;
 };
 
+// A sequence of points: on the whole surface below a node, or, on nodes of meshes, on what can be
+// seen of it from one of the directions of visible_area.h.
+struct ListName {
+    static constexpr int kWhole = -1;
+    ChildRef child;
+    uint32_t node = 0;
+    int direction = kWhole;
+};
+
 class PointLists {
 public:
     explicit PointLists(const Scene& scene);
@@ -59,13 +69,16 @@ public:
     // it did not suffice, lists that were not used in the last frame are dropped; where it has
     // become smaller than what is there, all are.
     void startFrame(const ListIdentity& identity, size_t budget_bytes);
-    // Points [first, first + count) of a node's sequence, which must not cross a multiple of 64:
+    // What can be seen of a mesh from a direction; measured when first asked for, then kept.
+    // Thread-safe.
+    const VisibleArea& visibleArea(uint32_t mesh, int direction);
+    // Points [first, first + count) of a sequence, which must not cross a multiple of 64:
     // lanes [first_lane, first_lane + count) of the block returned. From the cache, which first
     // grows to `list_length` points if the budget allows, else made in `scratch`. The same bits
     // either way. Thread-safe.
-    const ListBlock& points(ChildRef child, uint32_t node, uint32_t first, int count,
-                            uint32_t list_length, ListBlock& scratch, int& first_lane);
-    size_t bytes() const { return bytes_.load(std::memory_order_relaxed); }
+    const ListBlock& points(const ListName& name, uint32_t first, int count, uint32_t list_length,
+                            ListBlock& scratch, int& first_lane);
+    size_t bytes() const { return bytes_ + visible_bytes_; }
 
 private:
     struct List;
@@ -74,29 +87,35 @@ private:
         std::atomic<uint32_t> last_used{0};
     };
     using Slots = std::vector<Slot>;  // one a node
+    // A mesh from one direction.
+    struct Seen {
+        VisibleArea area;
+        Slots slots;
+    };
 
     const Slots& slotsOf(ChildRef child) const {
         return (child.isGroup() ? group_slots_ : mesh_slots_)[child.index()];
     }
-    Slots& slotsOf(ChildRef child) {
-        return (child.isGroup() ? group_slots_ : mesh_slots_)[child.index()];
-    }
+    Slot& slotOf(const ListName& name);
+    Seen& seen(uint32_t mesh, int direction);
     template <class Visit>
     void forEachSlot(const Visit& visit);
-    void makePoints(ChildRef child, uint32_t node, uint32_t first, int count, ListBlock& out) const;
-    List* grow(Slot& slot, ChildRef child, uint32_t node, uint32_t n_blocks);
+    void makePoints(const ListName& name, uint32_t first, int count, ListBlock& out);
+    List* grow(Slot& slot, const ListName& name, uint32_t n_blocks);
 
     const Scene& scene_;
     std::vector<Slots> mesh_slots_, group_slots_;
+    std::vector<std::atomic<Seen*>> seen_;  // by mesh and direction
     ListIdentity identity_;
     size_t budget_ = 0;
-    std::atomic<size_t> bytes_{0};
+    std::atomic<size_t> bytes_{0}, visible_bytes_{0};
     std::atomic<bool> is_full_{false};  // a list was refused in this frame
     uint32_t frame_ = 0;
     std::mutex mutex_;  // guards retired_
     std::vector<std::unique_ptr<List>> retired_;
     static constexpr int kStripes = 64;
     std::mutex stripes_[kStripes];  // one list grows at a time in each stripe
+    std::mutex seen_stripes_[kStripes];
 };
 
 }  // namespace stipple

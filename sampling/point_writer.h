@@ -13,15 +13,16 @@ struct RunDensity {
     double wanted = 0.0;  // kept points per subpixel of exactly projected area (K, or less where
                           // no one could tell)
     bool narrow = false;  // points cover no more than the subpixel they lie in
+    double layers = 1.0;  // of patches, one behind the other: they close each other's holes
 };
 
 class PointWriter {
 public:
     explicit PointWriter(TileContext& context) : context_(context) {}
 
-    // Points [first, first + count) of the sequence of a node of an instance's mesh or group; first
-    // is a multiple of 16, unless the sampler is random.
-    void add(const InstanceFrame& frame, ChildRef child, uint32_t node, const RunDensity& density,
+    // Points [first, first + count) of a sequence of an instance; first is a multiple of 16, unless
+    // the sampler is random. density: of the area that the sequence is spread over.
+    void add(const InstanceFrame& frame, const ListName& list, const RunDensity& density,
              uint32_t first, uint32_t count);
     // Where in a list an instance that needs few points begins: an aligned piece, another one for
     // each instance, so that equal trees do not show equal points.

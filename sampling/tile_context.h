@@ -18,7 +18,8 @@ struct Run {
     Mat3 camera_from_normal = Mat3(1.0f);
     ChildRef child;  // mesh or group
     uint32_t node = 0;
-    uint32_t first_index = 0;  // of the node's list, or of the mesh's triangles
+    int direction = ListName::kWhole;  // of the node's list
+    uint32_t first_index = 0;          // of the node's list, or of the mesh's triangles
     uint32_t list_length = 0;
     uint64_t path = 0;                        // of the mesh's or the group's instance
     uint32_t triangle_frame = kNotTriangles;  // index into triangle_frames
@@ -33,7 +34,7 @@ struct TileContext {
     std::vector<Run> runs;
     std::vector<InstanceFrame> triangle_frames;
 
-    // Below kTriangleBit.
+    // Below kSurfaceBit.
     uint32_t nextNumber() const { return uint32_t(runs.size()) * kBlockPoints; }
     const Run& runOf(uint32_t number) const { return runs[(number & ~kKindBits) / kBlockPoints]; }
 };

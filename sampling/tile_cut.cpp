@@ -45,8 +45,8 @@ void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSampl
     }
     int lane;
     ListBlock scratch;
-    const ListBlock& list =
-        context_.lists.points(run.child, run.node, index, 1, run.list_length, scratch, lane);
+    const ListBlock& list = context_.lists.points({run.child, run.node, run.direction}, index, 1,
+                                                  run.list_length, scratch, lane);
     sample.normal_world =
         glm::normalize(world_from_camera_ *
                        (run.camera_from_normal * unpackOctahedral(list.shading_normal[lane])));
@@ -148,15 +148,21 @@ bool TileCut::drawAsPoints(ChildRef ref, uint32_t node_index, const Affine& came
 void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& camera_from_object,
                        uint64_t path, const BoxProjection& box) {
     if (context_.scene.meshes[mesh_index].triangles.empty()) return;
+    const InstanceFrame frame = makeInstanceFrame(camera_from_object, path);
+    SeenMesh seen;
+    if (node_index == 0 && box.depth_ratio <= context_.settings.cut_ratio) {
+        seen = seeMesh(context_, frame, mesh_index,
+                       context_.settings.samples * box.bound * frame.area_scale);
+    }
     uint32_t triangle_frame = kNotTriangles;
-    drawMeshNode(makeInstanceFrame(camera_from_object, path), mesh_index, node_index, box,
-                 triangle_frame);
+    drawMeshNode(frame, mesh_index, seen, node_index, box, triangle_frame);
 }
 
 // The cut through a mesh's octree. triangle_frame: where the instance stands in
 // context.triangle_frames, once it does.
-void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, uint32_t node_index,
-                           const BoxProjection& box, uint32_t& triangle_frame) {
+void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, const SeenMesh& seen,
+                           uint32_t node_index, const BoxProjection& box,
+                           uint32_t& triangle_frame) {
     const RenderSettings& settings = context_.settings;
     const Mesh& mesh = context_.scene.meshes[mesh_index];
     const MeshNode& node = mesh.nodes[node_index];
@@ -165,16 +171,8 @@ void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, uint
             RunDensity density;
             density.wanted = settings.samples;
             density.drawn = settings.samples * box.bound * frame.area_scale;
-            const uint64_t key = hashCombine(settings.seed, frame.path, mesh_index, node_index);
-            const uint64_t count = roundAtRandom(std::min(density.drawn * node.area, 1e9), key);
-            // Parts of a mesh are near and have many points; whole ones may have few.
-            const bool is_random = settings.sampler == Sampler::kRandom;
-            const uint32_t first =
-                node_index == 0 || is_random
-                    ? points_.firstOf(hashCombine(frame.path, node_index), uint32_t(count))
-                    : 0;
-            points_.add(frame, ChildRef::mesh(mesh_index), node_index, density, first,
-                        uint32_t(count));
+            addMeshPoints(context_, points_, frame, mesh_index, node_index, seen, density,
+                          std::min(density.drawn * node.area, 1e9));
             return;
         }
         case NodeClass::kTriangles:
@@ -197,7 +195,7 @@ void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, uint
     const size_t end = opened_.size();
     for (size_t k = begin; k < end; ++k) {
         const Opened o = opened_[k];
-        if (!isHidden(o.box)) drawMeshNode(frame, mesh_index, o.index, o.box, triangle_frame);
+        if (!isHidden(o.box)) drawMeshNode(frame, mesh_index, seen, o.index, o.box, triangle_frame);
     }
     opened_.resize(begin);
 }

@@ -5,6 +5,7 @@
 
 #include <sampling/frame_plan.h>
 #include <sampling/group_points.h>
+#include <sampling/mesh_points.h>
 #include <sampling/projection.h>
 #include <sampling/triangle_writer.h>
 
@@ -34,8 +35,8 @@ private:
                       const BoxProjection& box);
     void drawMesh(uint32_t mesh, uint32_t node, const Affine& camera_from_object, uint64_t path,
                   const BoxProjection& box);
-    void drawMeshNode(const InstanceFrame& frame, uint32_t mesh, uint32_t node,
-                      const BoxProjection& box, uint32_t& triangle_frame);
+    void drawMeshNode(const InstanceFrame& frame, uint32_t mesh, const SeenMesh& seen,
+                      uint32_t node, const BoxProjection& box, uint32_t& triangle_frame);
     void collect(const Affine& camera_from_child, const Box3& bounds, uint32_t index,
                  bool is_instance);
     void sortCollected(size_t begin);

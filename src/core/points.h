@@ -41,11 +41,13 @@ struct Batch {
 
 inline constexpr int kBlockPoints = 64;
 
-// Numbers are below 2^30 and carry the kind in their high bits, so that all kinds meet in one depth
+// Numbers are below 2^29 and carry the kind in their high bits, so that all kinds meet in one depth
 // test.
 inline constexpr uint32_t kZBufferBit = 0x80000000u;   // a triangle of the frame's z-buffer
 inline constexpr uint32_t kTriangleBit = 0x40000000u;  // a triangle emitted in the tile
-inline constexpr uint32_t kKindBits = kZBufferBit | kTriangleBit;
+inline constexpr uint32_t kSurfaceBit = 0x20000000u;   // a point on a wide patch (kSurfaceWidth)
+inline constexpr uint32_t kAnyTriangle = kZBufferBit | kTriangleBit;
+inline constexpr uint32_t kKindBits = kAnyTriangle | kSurfaceBit;
 
 // Kernels work on whole vectors and may write this far beyond a block's last point.
 inline constexpr int kBlockPadding = 16;
@@ -53,7 +55,7 @@ inline constexpr int kBlockPadding = 16;
 // Width of the connected patch a point lies on (a leaf, a terrain), logarithmic in 8 bits: code c
 // stands for about 2^(first_exponent + c / 8).
 inline constexpr int kWidthsPerOctave = 8, kWidthCodes = 256;
-inline uint8_t patchWidthCode(float width, int first_exponent) {
+constexpr uint8_t patchWidthCode(float width, int first_exponent) {
     // Exponent and the first three bits of the mantissa.
     const int bits =
         int(std::bit_cast<uint32_t>(width) >> 20) - ((127 + first_exponent) * kWidthsPerOctave);
@@ -63,6 +65,10 @@ inline uint8_t patchWidthCode(float width, int first_exponent) {
 // in, or 1/K of it.
 inline constexpr int kFirstSubpixelExponent = -8;
 inline constexpr uint8_t kNoPatch = 0;
+// On patches at least that wide (subpixels) a hole is to be closed; between narrower ones it is a
+// gap.
+inline constexpr float kSurfaceWidth = 8.0f;
+inline constexpr uint8_t kSurfaceCode = patchWidthCode(kSurfaceWidth, kFirstSubpixelExponent);
 
 // Up to 64 points in camera space, structure of arrays.
 struct PointBlock {

@@ -33,13 +33,14 @@ struct RenderSettings {
     int cache_mb = 256;       // point lists kept between frames; 0: off
     double cut_ratio = 1.41;  // largest ratio of depths within a node of the cut
     double area_threshold =
-        4.0;  // triangles larger than this many subpixels are not drawn as points
+        1.0;  // triangles larger than this many subpixels are not drawn as points
     double large_triangle =
         1024.0;  // triangles larger than this many subpixels go to OSMesa, before the tiles
-    int list_length = 1024;  // most points taken from a node's list before the node is opened
-    int tile_size = 384;     // subpixels along a side of a screen tile (rounded to whole pixels)
-    bool culling = true;     // skip batches behind what a tile has already drawn
-    bool fill = true;        // per-pixel: occlusion removal and filling
+    int list_length = 1024;     // most points taken from a node's list before the node is opened
+    int tile_size = 384;        // subpixels along a side of a screen tile (rounded to whole pixels)
+    bool visible_lists = true;  // draw only what can be seen of far meshes from the eye's direction
+    bool culling = true;        // skip batches behind what a tile has already drawn
+    bool fill = true;           // per-pixel: occlusion removal and filling
 };
 
 // One setting as command line, JSON and help see it.

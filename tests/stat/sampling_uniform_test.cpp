@@ -80,7 +80,7 @@ Scene planeScene(const Affine& inner, const Affine& outer, int inner_copies) {
 
 MeshPoint pointOf(const Mesh& mesh, Sampler sampler, uint64_t list, uint32_t index) {
     const PointKey key{sampler, list, index};
-    return meshPointAt(mesh, mesh.nodes[0], listPosition(key), key);
+    return meshPointAt(mesh.cumulative_area, mesh.nodes[0], listPosition(key), key);
 }
 
 struct Drawn {
