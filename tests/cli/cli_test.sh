@@ -281,6 +281,10 @@ case_same_bits_for_any_threads() {
     cmp 1.png 5.png || fail "pictures differ"
     expect_ok render scene.scene.json -o cached.png --width 200 --height 150 --repeat 2
     cmp 1.png cached.png || fail "the cached picture differs"
+    for threads in 1 3; do
+        expect_ok render scene.scene.json -o rays$threads.png --width 201 --height 151 --threads $threads --method raycast --samples 5
+    done
+    cmp rays1.png rays3.png || fail "ray-cast pictures differ"
 }
 
 # Waits until process $1 is the program and catches both signals: before, a signal says nothing about the
