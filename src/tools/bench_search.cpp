@@ -7,7 +7,7 @@ namespace stipple {
 
 namespace {
 
-constexpr int kSubpixels[] = {1, 2, 3, 4, 6, 8};
+constexpr int kSubpixels[] = {1, 2, 3, 4, 5, 6, 8};
 constexpr double kSamples[] = {0.5, 1.0, 2.0, 4.0};
 constexpr double kAreaThresholds[] = {1.0, 16.0};
 constexpr double kGain = 0.1;  // dB: more points that bring less are not worth trying further

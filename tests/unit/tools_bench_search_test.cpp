@@ -35,7 +35,7 @@ TEST(ToolsBenchSearch, findsTheFastestForEachQuality) {
         EXPECT_GE(found->psnr_db, wanted);
         EXPECT_EQ(found->settings.area_threshold, 16.0) << "half the time";
         // As fast as anything on the whole grid with the default threshold.
-        for (const int subpixels : {1, 2, 3, 4, 6, 8}) {
+        for (const int subpixels : {1, 2, 3, 4, 5, 6, 8}) {
             for (const double samples : {0.5, 1.0, 2.0, 4.0}) {
                 RenderSettings other = base();
                 other.subpixels = subpixels;
