@@ -18,6 +18,7 @@ namespace {
 
 constexpr size_t kPacket = 16;
 constexpr int kAllActive = -1;
+constexpr int kFewChanges = 5;  // of the instance from ray to ray within a packet; measured
 
 // Where a ray ended: the slots from the root down to the mesh, and the place on it.
 struct HitPlace {
@@ -34,8 +35,8 @@ struct Level {
     RTCIntersectContext embree;         // first, so that the addresses are the same
     const GroupScene* group = nullptr;  // the one traced
     const Level* parent = nullptr;      // the level from which the ray came here ...
-    uint32_t slot = 0;                  // ... and through which of its instances
-    int depth = 0;
+    PartSlot from;                      // ... and through which of its instances
+    int depth = 0;                      // slots from the root to the group
     // The ray in double, in the group's space: rounding errors must not add up on the way down.
     // Nested scenes only.
     DVec3 origin = DVec3(0.0);
@@ -58,7 +59,7 @@ bool isThere(float alpha, const Ray& ray, const Level& level, uint32_t instance_
     const auto bits = [](float f) { return uint64_t(std::bit_cast<uint32_t>(f)); };
     uint64_t key = hashCombine(bits(ray.origin.x), bits(ray.origin.y), bits(ray.origin.z),
                                bits(ray.direction.x), bits(ray.direction.y), bits(ray.direction.z));
-    for (const Level* l = &level; l->parent; l = l->parent) key = hashCombine(key, l->slot);
+    for (const Level* l = &level; l->parent; l = l->parent) key = hashCombine(key, l->from.slot);
     return uniformFloat(hashCombine(key, instance_id, triangle)) < alpha;
 }
 
@@ -112,9 +113,16 @@ bool isNested(const RTCHit& hit) { return hit.instID[0] == RTC_INVALID_GEOMETRY_
 HitPlace placeOf(const Level& level, uint32_t instance_id, uint32_t geometry_id,
                  uint32_t primitive_id, float u, float v) {
     HitPlace place;
-    place.depth = level.depth + 1;
-    place.slots[level.depth] = level.group->meshSlot(instance_id);
-    for (const Level* l = &level; l->parent; l = l->parent) place.slots[l->depth - 1] = l->slot;
+    int end = level.depth;
+    const auto prepend = [&](const PartSlot& at) {
+        place.slots[--end] = at.slot;
+        end -= int(at.part->path.size());
+        std::copy(at.part->path.begin(), at.part->path.end(), place.slots.begin() + end);
+    };
+    const PartSlot mesh = level.group->meshAt(instance_id);
+    place.depth = end += mesh.part->depth();
+    prepend(mesh);
+    for (const Level* l = &level; l->parent; l = l->parent) prepend(l->from);
     place.geometry_id = geometry_id;
     place.primitive_id = primitive_id;
     place.u = u;
@@ -131,13 +139,14 @@ void intersectGroup(const RTCIntersectFunctionNArguments* args) {
     const Level& outer_level = *reinterpret_cast<const Level*>(args->context);
     RTCRayHit& outer = *reinterpret_cast<RTCRayHit*>(args->rayhit);
 
-    const uint32_t slot = parent.groupSlot(args->primID);
-    const GroupScene& child = parent.scenes->groups[parent.group->instances.child(slot).index()];
-    const Affine child_from_parent = inverse(parent.groupFromChild(slot));
+    const PartSlot at = parent.groupAt(args->primID);
+    const GroupScene& child =
+        parent.scenes->groups[at.part->group->instances.child(at.slot).index()];
+    const Affine child_from_parent = inverse(at.part->sceneFromChild(at.slot));
     Level level = makeLevel(child, outer_level.embree.flags);
     level.parent = &outer_level;
-    level.slot = slot;
-    level.depth = outer_level.depth + 1;
+    level.from = at;
+    level.depth = outer_level.depth + at.part->depth();
     level.origin = child_from_parent.point(outer_level.origin);
     level.direction = child_from_parent.linear * outer_level.direction;
     level.rays = outer_level.rays;
@@ -174,17 +183,24 @@ bool areCoherent(const Ray* rays, size_t count) {
     return true;
 }
 
+bool hasTextures(const Material& m) {
+    return m.base_texture != kNoTexture || m.normal_map.texture != kNoTexture ||
+           m.metallic_map.texture != kNoTexture;
+}
+
 class EmbreeRayCaster : public RayCaster {
 public:
     EmbreeRayCaster(const Scene& scene, const DVec3& origin_world, int n_threads)
         : scenes_(scene, origin_world, n_threads, TraceCallbacks{filterHit, intersectGroup}) {}
 
     void cast(const Ray* rays, size_t count, RayHit* hits, float footprint_per_t) const override {
-        const bool packets = !scenes_.root().has_groups;
+        const bool packets = scenes_.root().n_groups == 0;
+        // Whether packets stay together: as the packet before, which lies next to it.
+        bool together = true;
         for (size_t begin = 0; begin < count; begin += kPacket) {
             const size_t n = std::min(kPacket, count - begin);
             if (packets && n == kPacket && areCoherent(rays + begin, n)) {
-                castPacket(rays + begin, hits + begin, footprint_per_t);
+                together = castPacket(rays + begin, hits + begin, footprint_per_t, together);
             } else {
                 for (size_t i = begin; i < begin + n; ++i)
                     castOne(rays[i], hits[i], footprint_per_t);
@@ -212,7 +228,9 @@ private:
         hit = attributesAt(place, r.ray.tfar, footprint_per_t);
     }
 
-    void castPacket(const Ray* rays, RayHit* hits, float footprint_per_t) const {
+    // together: the packet is traversed as one rather than ray by ray. Returns whether its rays
+    // ended on few instances: then the next packet's will go the same ways, too.
+    bool castPacket(const Ray* rays, RayHit* hits, float footprint_per_t, bool together) const {
         RTCRayHit16 r;
         alignas(64) int valid[kPacket];
         for (unsigned i = 0; i < kPacket; ++i) {
@@ -232,16 +250,20 @@ private:
             r.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
             r.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
         }
-        Level level = makeLevel(scenes_.root(), RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+        Level level = makeLevel(scenes_.root(), together ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                                         : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
         level.rays = rays;
         rtcIntersect16(valid, scenes_.root().handle.get(), &level.embree, &r);
+        int changes = 0;
         for (size_t i = 0; i < kPacket; ++i) {
+            changes += i > 0 && r.hit.instID[0][i] != r.hit.instID[0][i - 1];
             hits[i] = RayHit();
             if (r.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
             hits[i] = attributesAt(placeOf(level, r.hit.instID[0][i], r.hit.geomID[i],
                                            r.hit.primID[i], r.hit.u[i], r.hit.v[i]),
                                    r.ray.tfar[i], footprint_per_t);
         }
+        return changes <= kFewChanges;
     }
 
     RayHit attributesAt(const HitPlace& place, float t, float footprint_per_t) const {
@@ -260,18 +282,22 @@ private:
         const MeshPart& part = scenes_.meshes[child.index()].parts[place.geometry_id];
         const uint32_t triangle = part.first_triangle + place.primitive_id;
 
+        const uint32_t material = part.mesh->triangle_material[triangle];
+
         // The cofactor matrix is the inverse transpose times the determinant: area vectors grow by
         // it.
         const DMat3 area_scale = cofactor(world_from_object);
         const double side = glm::determinant(world_from_object) < 0.0 ? -1.0 : 1.0;
-        const UVec3& v = part.mesh->triangles[triangle];
-        const DVec3 a(part.mesh->positions[v.x]), b(part.mesh->positions[v.y]),
-            c(part.mesh->positions[v.z]);
-        const DVec3 area_object = glm::cross(b - a, c - a);
-        const double length_scale =
-            std::sqrt(glm::length(area_scale * area_object) / glm::length(area_object));
-        const float footprint_object =
-            length_scale > 0.0 ? float(footprint_per_t * t / length_scale) : 0.0f;
+        float footprint_object = 0.0f;
+        if (hasTextures(scene.materials[material])) {
+            const UVec3& v = part.mesh->triangles[triangle];
+            const DVec3 a(part.mesh->positions[v.x]), b(part.mesh->positions[v.y]),
+                c(part.mesh->positions[v.z]);
+            const DVec3 area_object = glm::cross(b - a, c - a);
+            const double length_scale =
+                std::sqrt(glm::length(area_scale * area_object) / glm::length(area_object));
+            if (length_scale > 0.0) footprint_object = float(footprint_per_t * t / length_scale);
+        }
         const MeshSurface surface = surfaceAt(*part.mesh, scene.materials, scene.textures, triangle,
                                               place.u, place.v, footprint_object);
 
@@ -279,7 +305,7 @@ private:
         hit.t = t;
         hit.normal_world = Vec3(glm::normalize(area_scale * DVec3(surface.normal_object) * side));
         hit.albedo = surface.albedo;
-        hit.material = part.mesh->triangle_material[triangle];
+        hit.material = material;
         hit.object = objectId(path);
         return hit;
     }

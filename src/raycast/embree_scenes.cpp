@@ -64,21 +64,54 @@ void setVertices(RTCGeometry geometry, const Mesh& mesh) {
 
 void groupInstanceBounds(const RTCBoundsFunctionArguments* args) {
     const GroupScene& group = *static_cast<const GroupScene*>(args->geometryUserPtr);
-    const uint32_t slot = group.groupSlot(args->primID);
-    const Group& child = group.scenes->scene->groups[group.group->instances.child(slot).index()];
+    const auto [part, slot] = group.groupAt(args->primID);
+    const Group& child = group.scenes->scene->groups[part->group->instances.child(slot).index()];
     RTCBounds& b = *args->bounds_o;
     if (child.bounds.isEmpty()) {  // Embree leaves out primitives with inverted bounds
         b = {kInfinity, kInfinity, kInfinity, 0, -kInfinity, -kInfinity, -kInfinity, 0};
         return;
     }
-    const Box3 box = enclosingFloatBox(transformBox(group.groupFromChild(slot), child.bounds));
+    const Box3 box = enclosingFloatBox(transformBox(part->sceneFromChild(slot), child.bounds));
     // Rays are rounded when they enter the child; what touches its box must not be lost.
     const Vec3 pad = glm::max(glm::abs(box.min), glm::abs(box.max)) * 1e-6f;
     b = {box.min.x - pad.x, box.min.y - pad.y, box.min.z - pad.z, 0,
          box.max.x + pad.x, box.max.y + pad.y, box.max.z + pad.z, 0};
 }
 
+[[noreturn]] void throwTooDeep(const std::string& path) {
+    throw Error(ErrorCode::kUnsupported, path,
+                "groups are nested deeper than " + std::to_string(kMaxNesting) + " levels");
+}
+
+// How often every group is placed within what the root shows.
+void countPlacements(const Scene& scene, uint32_t index, std::vector<uint32_t>& placed) {
+    if (placed[index]++ > 0) return;  // what is below has been counted
+    const InstanceStore& instances = scene.groups[index].instances;
+    for (size_t slot = 0; slot < instances.size(); ++slot) {
+        const ChildRef child = instances.child(slot);
+        if (child.isGroup()) countPlacements(scene, child.index(), placed);
+    }
+}
+
+// The part whose ids, from part.*first on, hold id.
+PartSlot findSlot(const std::vector<ScenePart>& parts, uint32_t ScenePart::*first,
+                  const std::vector<uint32_t> ScenePart::*slots, uint32_t id) {
+    const auto next =
+        std::upper_bound(parts.begin(), parts.end(), id,
+                         [&](uint32_t i, const ScenePart& part) { return i < part.*first; });
+    const ScenePart& part = *(next - 1);
+    const uint32_t i = id - part.*first;
+    return {&part, (part.*slots).empty() ? i : (part.*slots)[i]};
+}
+
 }  // namespace
+
+PartSlot GroupScene::meshAt(uint32_t geometry_id) const {
+    return findSlot(parts, &ScenePart::first_mesh, &ScenePart::mesh_slots, geometry_id);
+}
+PartSlot GroupScene::groupAt(uint32_t primitive_id) const {
+    return findSlot(parts, &ScenePart::first_group, &ScenePart::group_slots, primitive_id);
+}
 
 EmbreeDevice::EmbreeDevice(int n_threads)
     : device_(rtcNewDevice(n_threads > 0 ? ("threads=" + std::to_string(n_threads)).c_str()
@@ -117,10 +150,13 @@ EmbreeScenes::EmbreeScenes(const Scene& s, const DVec3& origin_world, int n_thre
       device(n_threads),
       meshes(s.meshes.size()),
       groups(s.groups.size()),
+      pool_(n_threads),
       callbacks_(callbacks),
-      origin_world_(origin_world) {
+      origin_world_(origin_world),
+      placed_(s.groups.size()) {
     if (s.root >= s.groups.size())
         throw Error(ErrorCode::kInvalidScene, s.path, "the scene has no root group");
+    countPlacements(s, s.root, placed_);
     buildGroup(s.root, 1);
 }
 
@@ -157,70 +193,101 @@ void EmbreeScenes::buildMesh(uint32_t index) {
     device.check();
 }
 
-void EmbreeScenes::addInstance(GroupScene& out, uint32_t slot) {
-    const Affine a = out.groupFromChild(slot);
-    float columns[12];
-    for (int c = 0; c < 4; ++c) {
-        for (int r = 0; r < 3; ++r)
-            columns[3 * c + r] = float(c < 3 ? a.linear[c][r] : a.translation[r]);
+// An instance geometry for every mesh of the group, by all threads: Embree has no faster way to
+// make many.
+void EmbreeScenes::addInstances(const GroupScene& out) {
+    constexpr uint32_t kChunk = 4096;
+    pool_.forEach((out.n_meshes + kChunk - 1) / kChunk, [&](size_t chunk, int) {
+        const uint32_t begin = uint32_t(chunk) * kChunk;
+        for (uint32_t id = begin; id < std::min(begin + kChunk, out.n_meshes); ++id) {
+            const auto [part, slot] = out.meshAt(id);
+            const Affine a = part->sceneFromChild(slot);
+            float columns[12];
+            for (int c = 0; c < 4; ++c) {
+                for (int r = 0; r < 3; ++r)
+                    columns[3 * c + r] = float(c < 3 ? a.linear[c][r] : a.translation[r]);
+            }
+            const GeometryHandle geometry = newGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
+            rtcSetGeometryInstancedScene(
+                geometry.get(), meshes[part->group->instances.child(slot).index()].handle.get());
+            rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+            rtcCommitGeometry(geometry.get());
+            rtcAttachGeometryByID(out.handle.get(), geometry.get(), id);
+        }
+    });
+}
+
+// Adds a group's instances to a scene, and in its place those of a group that is placed only here.
+void EmbreeScenes::addPart(GroupScene& out, uint32_t index, const Affine& scene_from_group,
+                           const std::vector<uint32_t>& path, int level) {
+    if (level > kMaxNesting) throwTooDeep(scene->path);
+    out.height = std::max(out.height, 1 + int(path.size()));
+    const InstanceStore& instances = scene->groups[index].instances;
+    const uint32_t n = uint32_t(instances.size());
+    ScenePart part;
+    part.group = &scene->groups[index];
+    part.scene_from_group = scene_from_group;
+    part.path = path;
+    part.first_mesh = out.n_meshes;
+    part.first_group = out.n_groups;
+    std::vector<uint32_t> dissolved;
+    uint32_t n_meshes = 0, n_groups = 0;
+    for (uint32_t slot = 0; slot < n; ++slot) {
+        const ChildRef child = instances.child(slot);
+        if (!child.isGroup()) {
+            buildMesh(child.index());
+            ++n_meshes;
+        } else if (placed_[child.index()] == 1) {
+            dissolved.push_back(slot);
+        } else {
+            buildGroup(child.index(), level + 1);
+            out.height = std::max(out.height, 1 + int(path.size()) + groups[child.index()].height);
+            ++n_groups;
+        }
     }
-    const GeometryHandle geometry = newGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
-    rtcSetGeometryInstancedScene(geometry.get(),
-                                 meshes[out.group->instances.child(slot).index()].handle.get());
-    rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-    rtcCommitGeometry(geometry.get());
-    rtcAttachGeometry(out.handle.get(), geometry.get());
+    if (n_meshes < n && n_groups < n) {
+        part.mesh_slots.reserve(n_meshes);
+        part.group_slots.reserve(n_groups);
+        for (uint32_t slot = 0; slot < n; ++slot) {
+            const ChildRef child = instances.child(slot);
+            if (!child.isGroup()) {
+                part.mesh_slots.push_back(slot);
+            } else if (placed_[child.index()] > 1) {
+                part.group_slots.push_back(slot);
+            }
+        }
+    }
+    out.n_meshes += n_meshes;
+    out.n_groups += n_groups;
+    out.parts.push_back(std::move(part));
+    for (const uint32_t slot : dissolved) {
+        std::vector<uint32_t> child_path = path;
+        child_path.push_back(slot);
+        addPart(out, instances.child(slot).index(),
+                scene_from_group * instances.groupFromChild(slot), child_path, level + 1);
+    }
 }
 
 void EmbreeScenes::buildGroup(uint32_t index, int level) {
     GroupScene& out = groups[index];
-    if (out.handle) return;
-    const auto checkDepth = [&](int height) {
-        if (level + height > kMaxNesting) {
-            throw Error(ErrorCode::kUnsupported, scene->path,
-                        "groups are nested deeper than " + std::to_string(kMaxNesting) + " levels");
-        }
-    };
-    checkDepth(0);
-    out.group = &scene->groups[index];
+    if (out.handle) {
+        if (level + out.height - 1 > kMaxNesting) throwTooDeep(scene->path);
+        return;
+    }
     out.scenes = this;
-    if (index == scene->root) out.origin = origin_world_;
-    const InstanceStore& instances = out.group->instances;
-    const uint32_t n = uint32_t(instances.size());
-    uint32_t n_groups = 0;
-    int child_height = 0;
-    for (uint32_t slot = 0; slot < n; ++slot) {
-        const ChildRef child = instances.child(slot);
-        if (child.isGroup()) {
-            ++n_groups;
-            buildGroup(child.index(), level + 1);
-            child_height = std::max(child_height, groups[child.index()].height);
-        } else {
-            buildMesh(child.index());
-        }
-    }
-    checkDepth(child_height);
-    out.height = 1 + child_height;
-    out.has_groups = n_groups > 0;
-    out.n_meshes = n - n_groups;
-    if (out.has_groups && out.n_meshes > 0) {
-        out.group_slots.reserve(n_groups);
-        out.mesh_slots.reserve(out.n_meshes);
-        for (uint32_t slot = 0; slot < n; ++slot) {
-            (instances.child(slot).isGroup() ? out.group_slots : out.mesh_slots).push_back(slot);
-        }
-    }
+    Affine scene_from_group;
+    if (index == scene->root) scene_from_group.translation = -origin_world_;
+    addPart(out, index, scene_from_group, {}, level);
     out.handle = newScene();
-    for (uint32_t id = 0; id < out.n_meshes; ++id)
-        addInstance(out, out.meshSlot(id));  // their geometry ids count from 0
-    if (out.has_groups) {
+    addInstances(out);
+    if (out.n_groups > 0) {
         const GeometryHandle geometry = newGeometry(device, RTC_GEOMETRY_TYPE_USER);
-        rtcSetGeometryUserPrimitiveCount(geometry.get(), n_groups);
+        rtcSetGeometryUserPrimitiveCount(geometry.get(), out.n_groups);
         rtcSetGeometryUserData(geometry.get(), &out);
         rtcSetGeometryBoundsFunction(geometry.get(), groupInstanceBounds, nullptr);
         rtcSetGeometryIntersectFunction(geometry.get(), callbacks_.intersect_group);
         rtcCommitGeometry(geometry.get());
-        rtcAttachGeometry(out.handle.get(), geometry.get());
+        rtcAttachGeometryByID(out.handle.get(), geometry.get(), out.n_meshes);
     }
     rtcCommitScene(out.handle.get());
     device.check();
@@ -231,8 +298,12 @@ size_t EmbreeScenes::bytes() const {
         device.bytes() + meshes.size() * sizeof(MeshScene) + groups.size() * sizeof(GroupScene);
     for (const MeshScene& m : meshes) bytes += m.parts.size() * sizeof(MeshPart);
     for (const GroupScene& g : groups) {
-        bytes += (g.mesh_slots.size() + g.group_slots.size()) * sizeof(uint32_t) +
-                 g.n_meshes * kInstanceBytes;
+        bytes += g.n_meshes * kInstanceBytes;
+        for (const ScenePart& p : g.parts) {
+            bytes +=
+                sizeof(ScenePart) +
+                (p.path.size() + p.mesh_slots.size() + p.group_slots.size()) * sizeof(uint32_t);
+        }
     }
     return bytes;
 }

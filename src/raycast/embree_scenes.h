@@ -3,6 +3,7 @@
 // embree_raycaster.cpp traces. Private to this folder.
 #pragma once
 
+#include <core/parallel.h>
 #include <scenegraph/scene.h>
 
 #include <embree3/rtcore.h>
@@ -66,32 +67,41 @@ struct MeshScene {
 
 struct EmbreeScenes;
 
+// What a group's scene shows of one group: its own instances, or those of a group below that is
+// placed only once and was dissolved into it.
+struct ScenePart {
+    const Group* group = nullptr;
+    Affine scene_from_group;     // relative to the eye for the root's scene
+    std::vector<uint32_t> path;  // slots from the scene's group down to this one
+    uint32_t first_mesh = 0;     // the first one's geometry id
+    uint32_t first_group = 0;    // and primitive id of the user geometry
+    // Its instances of meshes and of groups, in the order of these ids. Empty: all instances.
+    std::vector<uint32_t> mesh_slots;
+    std::vector<uint32_t> group_slots;
+
+    int depth() const { return int(path.size()) + 1; }  // slots down to an instance of it
+    Affine sceneFromChild(uint32_t slot) const {
+        return scene_from_group * group->instances.groupFromChild(slot);
+    }
+};
+
+struct PartSlot {
+    const ScenePart* part = nullptr;
+    uint32_t slot = 0;  // in the part's group
+};
+
 // A group's scene: meshes are Embree instances, as Embree has one level of them; groups are the
 // primitives of one user geometry.
 struct GroupScene {
     SceneHandle handle;
     const EmbreeScenes* scenes = nullptr;
-    const Group* group = nullptr;
-    DVec3 origin = DVec3(0.0);  // subtracted from all translations: the eye for the root
-    // Instances of the group by geometry id (meshes) and by primitive id of the user geometry
-    // (groups). Empty: the same number.
-    std::vector<uint32_t> mesh_slots;
-    std::vector<uint32_t> group_slots;
-    uint32_t n_meshes = 0;  // instances of meshes
-    bool has_groups = false;
-    int height = 0;  // levels of groups from here down
+    std::vector<ScenePart> parts;  // by ids, ascending
+    uint32_t n_meshes = 0;         // instances of meshes
+    uint32_t n_groups = 0;         // instances of groups
+    int height = 0;                // levels of groups from here down
 
-    Affine groupFromChild(uint32_t slot) const {
-        Affine a = group->instances.groupFromChild(slot);
-        a.translation -= origin;
-        return a;
-    }
-    uint32_t meshSlot(uint32_t geometry_id) const {
-        return mesh_slots.empty() ? geometry_id : mesh_slots[geometry_id];
-    }
-    uint32_t groupSlot(uint32_t primitive_id) const {
-        return group_slots.empty() ? primitive_id : group_slots[primitive_id];
-    }
+    PartSlot meshAt(uint32_t geometry_id) const;
+    PartSlot groupAt(uint32_t primitive_id) const;
 };
 
 // What the tracer adds: called for every candidate hit of parts that need it, and for every group
@@ -107,8 +117,9 @@ struct EmbreeScenes {
     std::vector<MeshScene> meshes;  // both as in Scene; without a handle where the root shows none
     std::vector<GroupScene> groups;
 
-    // Builds what the root shows, children before parents. Throws kOutOfMemory, kUnsupported
-    // (nested deeper than kMaxNesting), kInternal.
+    // Builds what the root shows, children before parents. Groups placed only once are dissolved:
+    // their instances cost the same in the group above, and rays need no further level. Throws
+    // kOutOfMemory, kUnsupported (nested deeper than kMaxNesting), kInternal.
     EmbreeScenes(const Scene& scene, const DVec3& origin_world, int n_threads,
                  const TraceCallbacks& callbacks);
 
@@ -118,11 +129,15 @@ struct EmbreeScenes {
 private:
     void buildMesh(uint32_t index);
     void buildGroup(uint32_t index, int level);
+    void addPart(GroupScene& out, uint32_t index, const Affine& scene_from_group,
+                 const std::vector<uint32_t>& path, int level);
     SceneHandle newScene();
-    void addInstance(GroupScene& out, uint32_t slot);
+    void addInstances(const GroupScene& out);
 
+    ThreadPool pool_;
     TraceCallbacks callbacks_;
     DVec3 origin_world_;
+    std::vector<uint32_t> placed_;  // by group: how often, in all groups that the root shows
 };
 
 }  // namespace stipple

@@ -12,6 +12,14 @@ namespace stipple {
 namespace {
 
 constexpr int kTilePixels = 16;
+constexpr size_t kBatchRays = 256;
+
+// Rays that are cast together, in an order in which neighbours are coherent.
+struct RayBatch {
+    std::vector<Ray> rays;
+    std::vector<PixelSums*> sums;  // where each ray belongs; a pixel's rays are in order
+    std::vector<RayHit> hits;
+};
 
 // Offset of ray i of n in the pixel, in [0,1)^2: jittered in the cells of the squarest grid that n
 // fills, over which what is left is random.
@@ -31,7 +39,8 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
               Picture& picture, FrameStats& stats) {
     const Stopwatch watch;
     const int n_rays = std::max(1, int(std::lround(request.settings.samples)));
-    const Mat3 world_from_camera(glm::transpose(view.camera_from_world));
+    const Mat3 camera_from_world(view.camera_from_world),
+        world_from_camera(glm::transpose(view.camera_from_world));
     const int columns = (view.width + kTilePixels - 1) / kTilePixels,
               rows = (view.height + kTilePixels - 1) / kTilePixels;
     const float s = float(view.subpixels);
@@ -41,51 +50,67 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
     if (request.progress) request.progress("draw", 0.0);
     std::atomic<size_t> done{0};
     std::mutex progress_mutex;
+    const auto castAndShade = [&](RayBatch& batch) {
+        batch.hits.resize(batch.rays.size());
+        caster.cast(batch.rays.data(), batch.rays.size(), batch.hits.data(), footprint);
+        for (size_t r = 0; r < batch.rays.size(); ++r) {
+            const RayHit& hit = batch.hits[r];
+            PixelSums& sum = *batch.sums[r];
+            if (!(hit.t < kInfinity)) {
+                sum.addNothing();
+                continue;
+            }
+            SurfaceSample sample;
+            sample.depth = hit.t;
+            sample.position_camera =
+                camera_from_world * (batch.rays[r].origin + batch.rays[r].direction * hit.t);
+            sample.normal_world = hit.normal_world;
+            sample.albedo = hit.albedo;
+            sample.material = hit.material;
+            sample.object = hit.object;
+            sum.add(sample, shade(sample, materials[hit.material], lighting, view));
+            sum.points += 1.0f;
+        }
+        batch.rays.clear();
+        batch.sums.clear();
+    };
     pool.forEach(size_t(columns) * size_t(rows), [&](size_t t, int) {
         if (request.cancel && request.cancel->requested) return;
         const int x0 = int(t % columns) * kTilePixels, y0 = int(t / columns) * kTilePixels;
         const int x1 = std::min(x0 + kTilePixels, view.width),
                   y1 = std::min(y0 + kTilePixels, view.height);
-        // One stratum of all the tile's pixels at a time: neighbouring rays are coherent.
+        // Blocks of as few pixels as fill a packet with all their rays: rays that follow each other
+        // go through the same nodes.
+        const int side = n_rays >= 16 ? 1 : n_rays >= 4 ? 2 : 4;
         std::vector<PixelSums> sums(kTilePixels * kTilePixels);
-        std::vector<Ray> rays;
-        std::vector<RayHit> hits;
-        for (int i = 0; i < n_rays; ++i) {
-            rays.clear();
-            for (int y = y0; y < y1; ++y) {
-                for (int x = x0; x < x1; ++x) {
-                    const Vec2 o = pixelOffset(
-                        i, n_rays, hashCombine(request.settings.seed, uint64_t(x), uint64_t(y)));
-                    Vec3 origin, direction;
-                    view.ray((float(x) + o.x) * s, (float(y) + o.y) * s, origin, direction);
-                    rays.push_back({world_from_camera * origin, view.near_z,
-                                    world_from_camera * direction, view.far_z});
+        RayBatch batch;
+        for (int by = y0; by < y1; by += side) {
+            for (int bx = x0; bx < x1; bx += side) {
+                const int ex = std::min(bx + side, x1), ey = std::min(by + side, y1);
+                for (int i = 0; i < n_rays; ++i) {
+                    for (int y = by; y < ey; ++y) {
+                        for (int x = bx; x < ex; ++x) {
+                            const Vec2 o = pixelOffset(
+                                i, n_rays,
+                                hashCombine(request.settings.seed, uint64_t(x), uint64_t(y)));
+                            Vec3 origin, direction;
+                            view.ray((float(x) + o.x) * s, (float(y) + o.y) * s, origin, direction);
+                            batch.rays.push_back({world_from_camera * origin, view.near_z,
+                                                  world_from_camera * direction, view.far_z});
+                            batch.sums.push_back(
+                                &sums[size_t(y - y0) * kTilePixels + size_t(x - x0)]);
+                        }
+                    }
+                    if (batch.rays.size() < kBatchRays) continue;
+                    if (request.cancel && request.cancel->requested) return;
+                    castAndShade(batch);
                 }
-            }
-            hits.assign(rays.size(), {});
-            caster.cast(rays.data(), rays.size(), hits.data(), footprint);
-            for (size_t r = 0; r < rays.size(); ++r) {
-                const RayHit& hit = hits[r];
-                PixelSums& sum = sums[r];
-                if (!(hit.t < kInfinity)) {
-                    sum.addNothing();
-                    continue;
-                }
-                SurfaceSample sample;
-                sample.depth = hit.t;
-                sample.position_camera =
-                    Mat3(view.camera_from_world) * (rays[r].origin + rays[r].direction * hit.t);
-                sample.normal_world = hit.normal_world;
-                sample.albedo = hit.albedo;
-                sample.material = hit.material;
-                sample.object = hit.object;
-                sum.add(sample, shade(sample, materials[hit.material], lighting, view));
-                sum.points += 1.0f;
             }
         }
-        size_t r = 0;
+        castAndShade(batch);
         for (int y = y0; y < y1; ++y) {
-            for (int x = x0; x < x1; ++x) picture.write(x, y, sums[r++]);
+            for (int x = x0; x < x1; ++x)
+                picture.write(x, y, sums[size_t(y - y0) * kTilePixels + size_t(x - x0)]);
         }
         const size_t n = ++done;
         if (request.progress && n % 64 == 0) {

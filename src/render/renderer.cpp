@@ -14,8 +14,6 @@ namespace stipple {
 
 namespace {
 
-constexpr double kZBufferLimit = 1e9;  // triangles
-
 std::vector<RasterMesh> rasterMeshes(const Scene& scene) {
     std::vector<RasterMesh> meshes;
     for (const Mesh& m : scene.meshes) {

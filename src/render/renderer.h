@@ -16,6 +16,9 @@
 
 namespace stipple {
 
+// The z-buffer method draws every triangle, and refuses scenes of more than these (expanded).
+inline constexpr double kZBufferLimit = 1e9;
+
 struct FrameStats {
     // In order; names as in the --stats contract: build, plan, raster, draw, reconstruct, shade
     // (seconds of wall time).

@@ -99,9 +99,16 @@ bool parseArguments(CLI::App& app, const HelpText& help,
     return true;
 }
 
-void SettingOptions::addTo(CLI::App& app) {
+std::string joinCommand(const std::string& command, const std::vector<std::string>& arguments) {
+    std::string line = "stipple " + command;
+    for (const std::string& argument : arguments) line += " " + argument;
+    return line;
+}
+
+void SettingOptions::addTo(CLI::App& app, const std::vector<std::string>& keys) {
     for (const SettingInfo& info : settingsTable()) {
         if (!info.has_option) continue;
+        if (!keys.empty() && std::find(keys.begin(), keys.end(), info.key) == keys.end()) continue;
         Given& given = given_.emplace_back();
         given.key = info.key;
         given.option = app.add_option(dashed(info.key), given.text, describe(info, false))
@@ -113,6 +120,15 @@ void SettingOptions::addTo(CLI::App& app) {
         ->type_name("KEY=VALUE")
         ->allow_extra_args(false)
         ->group("Settings");
+}
+
+bool SettingOptions::sets(const std::string& key) const {
+    for (const std::string& set : sets_) {
+        if (set.substr(0, set.find('=')) == key) return true;
+    }
+    return std::any_of(given_.begin(), given_.end(), [&](const Given& given) {
+        return given.key == key && given.option->count() > 0;
+    });
 }
 
 void SettingOptions::apply(RenderSettings& settings) const {

@@ -24,10 +24,16 @@ struct HelpText {
 // exists.
 bool parseArguments(CLI::App& app, const HelpText& help, const std::vector<std::string>& arguments);
 
+// "stipple render a.glb -o a.png"
+std::string joinCommand(const std::string& command, const std::vector<std::string>& arguments);
+
 // One option for each setting that has one, and --set for all of them.
 class SettingOptions {
 public:
-    void addTo(CLI::App& app);
+    // keys: the settings that get an option; empty: all that have one.
+    void addTo(CLI::App& app, const std::vector<std::string>& keys = {});
+    // Whether the command line sets this key.
+    bool sets(const std::string& key) const;
     // Sets what the command line gave: --set first, then the options. Throws kInvalidArgument.
     void apply(RenderSettings& settings) const;
 

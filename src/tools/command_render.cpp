@@ -4,6 +4,7 @@
 #include <core/stopwatch.h>
 #include <render/renderer.h>
 #include <scenegraph/io/load.h>
+#include <tools/choose_camera.h>
 #include <tools/command_line.h>
 #include <tools/commands.h>
 #include <tools/output_file.h>
@@ -142,22 +143,6 @@ RenderSettings effectiveSettings(const RenderOptions& options, const Scene& scen
     return settings;
 }
 
-const Camera& chooseCamera(const Scene& scene, const std::string& name) {
-    if (scene.cameras.empty()) throw Error(ErrorCode::kInvalidScene, scene.path, "has no camera");
-    if (name.empty()) return scene.cameras.front();
-    if (const Camera* camera = scene.findCamera(name)) return *camera;
-    std::string known;
-    for (const Camera& camera : scene.cameras) known += (known.empty() ? "" : ", ") + camera.name;
-    throw Error(ErrorCode::kInvalidArgument, "--camera",
-                "there is no '" + name + "'; " + scene.path + " has: " + known);
-}
-
-std::string joinCommand(const std::vector<std::string>& arguments) {
-    std::string command = "stipple render";
-    for (const std::string& argument : arguments) command += " " + argument;
-    return command;
-}
-
 // What an .exr says about how it was made. A .png says nothing, so that equal pictures are equal
 // files.
 std::map<std::string, std::string> imageMetadata(const RunStats& stats, const std::string& output) {
@@ -183,7 +168,7 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
     const CancelFlag& cancel = cancelOnSignals();
     Progress progress(options.quiet);
     RunStats stats;
-    stats.command = joinCommand(arguments);
+    stats.command = joinCommand("render", arguments);
     stats.scene_path = options.scene;
 
     progress.update("load", 0.0);

@@ -14,6 +14,7 @@ namespace stipple {
 ExitCode runRender(const std::vector<std::string>& arguments);
 ExitCode runInfo(const std::vector<std::string>& arguments);
 ExitCode runCompare(const std::vector<std::string>& arguments);
+ExitCode runBench(const std::vector<std::string>& arguments);
 ExitCode runGenerate(const std::vector<std::string>& arguments);
 ExitCode runHelp(const std::vector<std::string>& arguments);
 

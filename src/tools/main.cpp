@@ -35,6 +35,7 @@ const std::vector<Command>& commandTable() {
         {"render", "draw a picture of a scene", runRender},
         {"info", "say what is in a scene", runInfo},
         {"compare", "measure how much two pictures differ", runCompare},
+        {"bench", "measure points beside rays and the z-buffer", runBench},
         {"generate", "make trees, rocks, terrains, forests and landscapes", runGenerate},
         {"help", "explain a command, or list the settings", runHelp},
     };

@@ -64,7 +64,7 @@ case_no_arguments() {
 }
 
 case_help() {
-    for arguments in --help help "help render" "render --help" "info -h" "compare --help" "generate --help" "help settings"; do
+    for arguments in --help help "help render" "render --help" "info -h" "compare --help" "bench --help" "generate --help" "help settings"; do
         # shellcheck disable=SC2086
         expect_ok $arguments
         [[ -s stdout.txt && ! -s stderr.txt ]] || fail "help belongs on stdout: $arguments"
@@ -78,7 +78,7 @@ case_help() {
 
 # docs/cli.md names every option of every command, and no option that does not exist.
 case_help_names_every_option() {
-    for command in render info compare generate; do "$stipple" help "$command"; done |
+    for command in render info compare bench generate; do "$stipple" help "$command"; done |
         grep -oE -- '^  (-. )?--[a-z-]+' | grep -oE -- '--[a-z-]+' | sort -u >have.txt
     grep -oE -- '--[a-z][a-z-]*' "$repository/docs/cli.md" | sort -u >documented.txt
     [[ $(wc -l <have.txt) -gt 20 ]] || fail "cannot read the help"
@@ -281,6 +281,10 @@ case_same_bits_for_any_threads() {
     cmp 1.png 5.png || fail "pictures differ"
     expect_ok render scene.scene.json -o cached.png --width 200 --height 150 --repeat 2
     cmp 1.png cached.png || fail "the cached picture differs"
+    for threads in 1 3; do
+        expect_ok render scene.scene.json -o rays$threads.png --width 201 --height 151 --threads $threads --method raycast --samples 5
+    done
+    cmp rays1.png rays3.png || fail "ray-cast pictures differ"
 }
 
 # Waits until process $1 is the program and catches both signals: before, a signal says nothing about the
@@ -393,6 +397,82 @@ case_generate() {
     expect_error 2 '--season' generate rock --season winter -o a.glb
     expect_error 2 '--species' generate fern --species oak -o a.glb
     expect_no_file a.glb
+}
+
+quick_bench=("${tiny[@]}" --repetitions 2 --reference-rays 64)
+
+case_bench() {
+    export STIPPLE_CACHE=$PWD/cache TMPDIR=$PWD/tmp
+    mkdir tmp
+    write_scene
+    expect_ok bench scene.scene.json "${quick_bench[@]}" --json a.json
+    for text in '^camera front' '^camera top' '^    points +[1-8]x' '^    raycast +16 rays' '^    zbuffer +4x4' \
+        'quality of 1 ray a' 'first picture' "machine's limit" 'million rays/s'; do
+        expect_stdout "$text"
+    done
+    grep -q '^top: reference: ' stderr.txt || fail "no progress"
+    for key in schema version command scene width height threads repetitions load_seconds limit_buffer_bytes \
+        left_out cameras reference methods first_picture build_seconds frame_seconds picture_seconds peak_bytes \
+        qualities reached settings samples subpixels area_threshold psnr_db flip holes still_seconds \
+        moving_seconds still_ratio points_drawn phases cached_per_second_core fresh_per_second_core \
+        limit_per_second limit_bytes_per_second limit_share rays_per_second search; do
+        grep -q "\"$key\"" a.json || fail "--json lacks $key"
+    done
+    [[ $(grep -c '"method": "points"' a.json) == 2 ]] || fail "not two cameras"
+    [[ $(grep -c '"method": "zbuffer"' a.json) == 2 ]] || fail "zbuffer is missing"
+    [[ $(grep -c '"still_seconds": 0.0,' a.json) == 0 ]] || fail "something was not timed"
+
+    expect_ok bench scene.scene.json "${quick_bench[@]}" --camera top --against zbuffer --quiet
+    [[ ! -s stderr.txt ]] || fail "not quiet"
+    grep -qE '^camera front|^    raycast' stdout.txt && fail "measured what was not asked for"
+
+    # Above its limit, zbuffer is left out and the rest goes on.
+    "$stipple" generate landscape --count 100000000 -o big.scene.json >/dev/null || fail "cannot generate"
+    expect_ok bench big.scene.json "${tiny[@]}" --repetitions 1 --reference-rays 4
+    expect_stdout '^zbuffer is left out'
+    grep -qE '^    zbuffer' stdout.txt && fail "zbuffer was not left out"
+    [[ -z $(ls tmp) ]] || fail "a temporary folder is left"
+}
+
+case_bench_usage() {
+    write_scene
+    expect_error 2 "did you mean 'zbuffer'" bench scene.scene.json --against zbufer
+    expect_error 2 'samples cannot be set' bench scene.scene.json --set samples=2
+    expect_error 2 "'side'.*front, top" bench scene.scene.json --camera side
+    expect_error 2 '--repetitions' bench scene.scene.json --repetitions 0
+    expect_error 3 'missing\.glb' bench missing.glb
+    expect_error 1 'no folder' bench scene.scene.json --json missing/a.json
+    echo "a file" >cache
+    STIPPLE_CACHE=$PWD/cache expect_error 1 'cache' bench scene.scene.json "${quick_bench[@]}" --quiet
+}
+
+# A reference is cast once for a camera; another scene needs another one.
+case_bench_reference_cache() {
+    export STIPPLE_CACHE=$PWD/cache
+    write_scene
+    local n=0
+    one() {
+        expect_ok bench scene.scene.json "${quick_bench[@]}" --against raycast --camera front --json a.json "$@"
+        [[ $(find cache -type f | wc -l) == "$n" ]] || fail "not $n references: $*"
+    }
+    n=1; one
+    one
+    grep -q '"cached": true' a.json || fail "the reference was cast again"
+    n=2; one --seed 2 --camera top
+    n=2; one --threads 1
+    sed -i 's/"triangles": 500/"triangles": 2000/' scene.scene.json
+    n=3; one
+    # One that is damaged is made again.
+    find cache -type f -exec truncate -s 100 {} +
+    one
+    grep -q '"cached": false' a.json || fail "a damaged reference was used"
+}
+
+case_interrupt_bench() {
+    export STIPPLE_CACHE=$PWD/cache
+    write_scene
+    interrupt INT 1 bench scene.scene.json --reference-rays 10000
+    expect_no_file 'reference*'
 }
 
 declare -F "case_$3" >/dev/null || fail "there is no case $3"

@@ -274,6 +274,41 @@ TEST(RaycastEmbree, nestedGroupsAgreeWithBruteForce) {
                            randomRays(4000, 2.0, false));
 }
 
+// Groups that are placed once, in chains and beside groups that are placed often: their instances
+// are traced as if they lay in the group above.
+TEST(RaycastEmbree, groupsPlacedOnceAgreeWithBruteForce) {
+    Scene scene = nestedScene(DVec3(0));
+    const uint32_t often = 0, chain_end = scene.root;
+    const uint32_t chain = addGroup(
+        scene, {{ChildRef::group(chain_end), affine(rotationY(0.4) * 0.9, DVec3(0.5, 0, 0))}});
+    const uint32_t beside = addGroup(
+        scene, {{ChildRef::mesh(1), moved(0, 6, 0)},
+                {ChildRef::group(chain), affine(DMat3(1, 0, 0, 0, 1, 0.2, 0, 0, -1), DVec3(0))},
+                {ChildRef::mesh(0), moved(0, -6, 0)},
+                {ChildRef::group(often), moved(6, 0, 0)}});
+    const uint32_t only_meshes = addGroup(
+        scene, {{ChildRef::mesh(0), moved(-7, 0, 0)}, {ChildRef::mesh(1), moved(7, 3, 0)}});
+    const uint32_t nothing = addGroup(scene, {});
+    addGroup(scene, {{ChildRef::group(nothing), Affine()},
+                     {ChildRef::group(beside), affine(rotationY(-0.3), DVec3(1, 0, 0))},
+                     {ChildRef::mesh(1), moved(0, 0, 8)},
+                     {ChildRef::group(only_meshes), affine(rotationY(1.3), DVec3(0, 1, 0))}});
+    ThreadPool pool(1);
+    buildScene(scene, pool);
+    expectSameAsBruteForce(scene, DVec3(0.3, 0.1, -0.2), randomRays(4000, 2.0, false));
+
+    const uint32_t all_around =
+        addGroup(scene, {{ChildRef::mesh(0), affine(DMat3(2.0), DVec3(-3, 0, 1))},
+                         {ChildRef::mesh(0), affine(DMat3(2.0), DVec3(3, 0, 1))}});
+    const uint32_t above_below = addGroup(
+        scene, {{ChildRef::mesh(1), moved(0, 3, 0)}, {ChildRef::mesh(0), moved(0, -3, 0)}});
+    addGroup(scene, {{ChildRef::group(all_around), affine(rotationY(0.5), DVec3(0.2, 0, 0))},
+                     {ChildRef::mesh(0), moved(0, 0, -3)},
+                     {ChildRef::group(above_below), affine(rotationY(-0.5), DVec3(0))}});
+    buildScene(scene, pool);  // traced in packets
+    expectSameAsBruteForce(scene, DVec3(0.3, 0.1, -0.2), randomRays(2000, 1.0, true));
+}
+
 TEST(RaycastEmbree, placesFarFromTheOriginAreExact) {
     const DVec3 far(2e5, 30.0, -4e5);  // floats are 3 cm apart there
     expectSameAsBruteForce(nestedScene(far), far + DVec3(0.3, 0.1, -0.2),
@@ -464,8 +499,11 @@ TEST(RaycastEmbree, nestingTooDeepToTraceIsAnError) {
         Scene scene = emptyScene();
         scene.meshes.push_back(triangleMesh());
         addGroup(scene, {{ChildRef::mesh(0), Affine()}});
-        for (int i = 1; i < levels; ++i)
-            addGroup(scene, {{ChildRef::group(uint32_t(i - 1)), Affine()}});
+        // The copy beside keeps the group from being dissolved into the one above.
+        for (int i = 1; i < levels; ++i) {
+            const ChildRef below = ChildRef::group(uint32_t(i - 1));
+            addGroup(scene, {{below, Affine()}, {below, moved(900, 0, 0)}});
+        }
         if (levels <= 64) {
             ThreadPool pool(1);
             buildScene(scene, pool);

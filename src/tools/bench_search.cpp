@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <tools/bench_search.h>
+
+#include <algorithm>
+
+namespace stipple {
+
+namespace {
+
+constexpr int kSubpixels[] = {1, 2, 3, 4, 5, 6, 8};
+constexpr double kSamples[] = {0.5, 1.0, 2.0, 4.0};
+constexpr double kAreaThresholds[] = {1.0, 16.0};
+constexpr double kGain = 0.1;  // dB: more points that bring less are not worth trying further
+
+}  // namespace
+
+const SearchStep* fastestStep(const std::vector<SearchStep>& steps, double wanted_db) {
+    const SearchStep* fastest = nullptr;
+    for (const SearchStep& step : steps) {
+        if (step.psnr_db >= wanted_db && (!fastest || step.seconds < fastest->seconds))
+            fastest = &step;
+    }
+    return fastest;
+}
+
+const SearchStep& bestStep(const std::vector<SearchStep>& steps) {
+    return *std::max_element(
+        steps.begin(), steps.end(),
+        [](const SearchStep& a, const SearchStep& b) { return a.psnr_db < b.psnr_db; });
+}
+
+std::vector<SearchStep> searchSettings(const RenderSettings& base,
+                                       const std::vector<double>& wanted_db, double limit_seconds,
+                                       const TrySettings& attempt) {
+    std::vector<SearchStep> steps;
+    for (const int subpixels : kSubpixels) {
+        // The time beyond which nothing is of use.
+        const auto limit = [&] {
+            const SearchStep* reached = fastestStep(steps, wanted_db.back());
+            return reached ? reached->seconds : limit_seconds;
+        };
+        double psnr_before = -kInfinity;
+        for (const double samples : kSamples) {
+            // More subpixels and more samples only take longer.
+            const bool is_slow = std::any_of(steps.begin(), steps.end(), [&](const SearchStep& s) {
+                return s.settings.subpixels <= subpixels && s.settings.samples <= samples &&
+                       s.seconds > limit();
+            });
+            if (is_slow) break;
+            RenderSettings settings = base;
+            settings.subpixels = subpixels;
+            settings.samples = samples;
+            steps.push_back(attempt(settings));
+            if (steps.back().psnr_db < psnr_before + kGain) break;
+            psnr_before = steps.back().psnr_db;
+        }
+    }
+    for (const double wanted : wanted_db) {
+        const SearchStep* found = fastestStep(steps, wanted);
+        if (!found) found = &bestStep(steps);
+        const RenderSettings around = found->settings;
+        std::vector<RenderSettings> others;
+        for (const double area : kAreaThresholds) {
+            others.push_back(around);
+            others.back().area_threshold = area;
+        }
+        // Between the steps of the grid.
+        others.push_back(around);
+        others.back().samples *= 0.7;
+        for (const RenderSettings& settings : others) {
+            const bool is_known =
+                std::any_of(steps.begin(), steps.end(), [&](const SearchStep& step) {
+                    return step.settings.subpixels == settings.subpixels &&
+                           step.settings.samples == settings.samples &&
+                           step.settings.area_threshold == settings.area_threshold;
+                });
+            if (!is_known) steps.push_back(attempt(settings));
+        }
+    }
+    return steps;
+}
+
+}  // namespace stipple
