@@ -51,9 +51,12 @@ Json infoJson(const Scene& scene, const std::vector<std::string>& warnings) {
                                   {"triangles", jsonCount(group.triangles_total)}});
     }
     json["assets"] = Json::array();
-    for (const Mesh& mesh : scene.meshes) {
+    const std::vector<double> shown = meshInstances(scene);
+    for (size_t i = 0; i < scene.meshes.size(); ++i) {
+        const Mesh& mesh = scene.meshes[i];
         json["assets"].push_back({{"name", mesh.name},
                                   {"triangles", mesh.triangles.size()},
+                                  {"instances", jsonCount(shown[i])},
                                   {"vertices", mesh.positions.size()},
                                   {"bytes", mesh.bytes()}});
     }
@@ -98,9 +101,10 @@ std::string joinNames(const Json& names) {
 void printInfo(const Json& info) {
     std::ostream& out = std::cout;
     out << "scene       " << info["path"].get<std::string>() << "\n"
-        << "instances   " << groupedDigits(info["instances"]) << " ("
-        << groupedDigits(info["instances_stored"]) << " stored)\n"
-        << "triangles   " << groupedDigits(info["triangles_unique"]) << " unique, "
+        << "instances   " << groupedDigits(info["instances"]) << ", by "
+        << groupedDigits(info["instances_stored"]) << " records in " << info["groups"].size()
+        << (info["groups"].size() == 1 ? " group\n" : " groups\n") << "triangles   "
+        << groupedDigits(info["triangles_unique"]) << " unique, "
         << groupedDigits(info["triangles_total"]) << " expanded\n"
         << "memory      " << byteSize(info["bytes"]) << ", of that "
         << byteSize(info["instance_bytes"]) << " for instances\n"
@@ -111,14 +115,17 @@ void printInfo(const Json& info) {
     for (const Json& group : info["groups"]) {
         out << "  " << group["name"].get<std::string>() << ": depth " << group["depth"] << ", "
             << groupedDigits(group["instances"]) << " instances ("
-            << groupedDigits(group["instances_stored"]) << " stored), "
+            << groupedDigits(group["instances_stored"])
+            << (group["instances_stored"] == 1 ? " record), " : " records), ")
             << groupedDigits(group["triangles"]) << " triangles" << (group["root"] ? ", root" : "")
             << "\n";
     }
     out << "assets\n";
     for (const Json& asset : info["assets"]) {
         out << "  " << asset["name"].get<std::string>() << ": " << groupedDigits(asset["triangles"])
-            << " triangles, " << byteSize(asset["bytes"]) << "\n";
+            << " triangles, " << groupedDigits(asset["instances"])
+            << (asset["instances"] == 1 ? " instance, " : " instances, ")
+            << byteSize(asset["bytes"]) << "\n";
     }
 }
 
