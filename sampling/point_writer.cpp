@@ -50,6 +50,7 @@ void PointWriter::add(const InstanceFrame& frame, ChildRef child, uint32_t node,
     const KernelParams params = makeParams(context_, frame, child, node, density);
     Run run;
     run.camera_from_normal = frame.camera_from_normal;
+    run.length_scale = float(std::sqrt(frame.area_scale));
     run.child = child;
     run.node = node;
     run.list_length = params.random ? 0 : listLength(uint64_t(first) + count);
