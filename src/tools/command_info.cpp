@@ -82,6 +82,11 @@ std::string groupedDigits(double count) {
     return result;
 }
 
+// "1 group", "1,025 groups"
+std::string counted(double count, const std::string& noun) {
+    return groupedDigits(count) + " " + noun + (count == 1.0 ? "" : "s");
+}
+
 std::string byteSize(double bytes) {
     char text[64];
     std::snprintf(text, sizeof text, bytes < 1e6 ? "%.1f kB" : "%.1f MB",
@@ -101,10 +106,10 @@ std::string joinNames(const Json& names) {
 void printInfo(const Json& info) {
     std::ostream& out = std::cout;
     out << "scene       " << info["path"].get<std::string>() << "\n"
-        << "instances   " << groupedDigits(info["instances"]) << ", by "
-        << groupedDigits(info["instances_stored"]) << " records in " << info["groups"].size()
-        << (info["groups"].size() == 1 ? " group\n" : " groups\n") << "triangles   "
-        << groupedDigits(info["triangles_unique"]) << " unique, "
+        << "instances   " << groupedDigits(info["instances"]) << " ("
+        << counted(info["instances_stored"], "record") << " in "
+        << counted(double(info["groups"].size()), "group") << ")\n"
+        << "triangles   " << groupedDigits(info["triangles_unique"]) << " unique, "
         << groupedDigits(info["triangles_total"]) << " expanded\n"
         << "memory      " << byteSize(info["bytes"]) << ", of that "
         << byteSize(info["instance_bytes"]) << " for instances\n"
@@ -114,18 +119,15 @@ void printInfo(const Json& info) {
     out << "groups\n";
     for (const Json& group : info["groups"]) {
         out << "  " << group["name"].get<std::string>() << ": depth " << group["depth"] << ", "
-            << groupedDigits(group["instances"]) << " instances ("
-            << groupedDigits(group["instances_stored"])
-            << (group["instances_stored"] == 1 ? " record), " : " records), ")
-            << groupedDigits(group["triangles"]) << " triangles" << (group["root"] ? ", root" : "")
-            << "\n";
+            << counted(group["instances"], "instance") << " ("
+            << counted(group["instances_stored"], "record") << "), "
+            << counted(group["triangles"], "triangle") << (group["root"] ? ", root" : "") << "\n";
     }
     out << "assets\n";
     for (const Json& asset : info["assets"]) {
-        out << "  " << asset["name"].get<std::string>() << ": " << groupedDigits(asset["triangles"])
-            << " triangles, " << groupedDigits(asset["instances"])
-            << (asset["instances"] == 1 ? " instance, " : " instances, ")
-            << byteSize(asset["bytes"]) << "\n";
+        out << "  " << asset["name"].get<std::string>() << ": "
+            << counted(asset["triangles"], "triangle") << ", "
+            << counted(asset["instances"], "instance") << ", " << byteSize(asset["bytes"]) << "\n";
     }
 }
 
