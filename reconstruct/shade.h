@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shading of one surface sample: Lambert (two-sided where the material is), translucency, Phong
-// lobe, suns, point and spot lights, and a sky or an environment. Done per sample (subpixel, point
-// or ray) before samples are averaged into pixels, the same for every method.
+// Shading of one surface sample: Lambert (two-sided where the material is), translucency, a
+// microfacet lobe, suns, point and spot lights, and a sky or an environment. Done per sample
+// (subpixel, point or ray) before samples are averaged into pixels, the same for every method.
+// Based on: Khronos. glTF 2.0 Specification. 2021 (appendix B: BRDF Implementation).
 #pragma once
 
 #include <core/camera.h>
@@ -15,6 +16,16 @@ namespace stipple {
 // double-sided materials.
 Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
            const View& view);
+
+// The two parts of a surface's BRDF, without translucency: what a light's irradiance on a surface
+// that faces it is multiplied with, but for the cosine. normal, to_light, to_eye: unit vectors;
+// null where light or eye are behind the surface.
+struct Brdf {
+    Vec3 diffuse = Vec3(0);
+    Vec3 specular = Vec3(0);
+};
+Brdf evaluateBrdf(const Vec3& albedo, const SurfaceFinish& finish, const Vec3& normal,
+                  const Vec3& to_light, const Vec3& to_eye);
 
 // Radiance of the sky in a (world space, unit) direction.
 Vec3 skyRadiance(const Sky& sky, const Vec3& direction_world);

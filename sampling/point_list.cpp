@@ -55,6 +55,13 @@ Vec3 unpackSrgb8(uint32_t p) {
     return Vec3(table[p & 255], table[p >> 8 & 255], table[p >> 16 & 255]);
 }
 
+uint32_t packPlace(Vec2 uv) {
+    const auto q = [](float v) { return uint32_t(std::clamp(v, 0.0f, 1.0f) * 65535.0f + 0.5f); };
+    return q(uv.x) | q(uv.y) << 16;
+}
+
+Vec2 unpackPlace(uint32_t p) { return Vec2(p & 0xffff, p >> 16) / 65535.0f; }
+
 struct PointLists::List {
     uint32_t block_count = 0;
     std::unique_ptr<ListBlock[]> blocks;
@@ -145,39 +152,44 @@ namespace {
 // A point before it is quantized, in the space of its node.
 struct Point {
     Vec3 position = Vec3(0);
-    DVec3 normal = DVec3(0);  // geometric; length: the density it deserves over that of its list
-    Vec3 shading_normal = Vec3(0), albedo = Vec3(0);
+    DVec3 normal = DVec3(0);   // geometric; length: the density it deserves over that of its list
+    bool is_textured = false;  // looked up by `at`, else:
+    Vec3 shading_normal = Vec3(0), albedo = Vec3(0);  // of the node's space
+    MeshPoint at;
     float patch_width = 0.0f;
     bool single_sided = false;
     uint16_t material = 0;
-    uint32_t slot = 0;
+    uint32_t instance = 0;
 };
-
-// A point of a full list stands for this much of the surface; textures are filtered to it.
-float listFootprint(double area) { return float(std::sqrt(area / double(kBlockPoints * 16))); }
 
 template <class T>
 Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const std::vector<T>& cumulative_area,
-                    const MeshNode& node, double position, float footprint, const PointKey& key) {
+                    const MeshNode& node, double position, const PointKey& key) {
     const MeshPoint at = meshPointAt(cumulative_area, node, position, key);
     const UVec3& t = mesh.triangles[at.triangle];
     const Vec3 a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a, e2 = mesh.positions[t.z] - a;
-    const MeshSurface surface =
-        surfaceAt(mesh, scene.materials, scene.textures, at.triangle, at.u, at.v, footprint);
     const Stratum& stratum = mesh.strata[mesh.triangle_stratum[at.triangle]];
     Point p;
     p.position = a + e1 * at.u + e2 * at.v;
-    p.shading_normal = surface.normal_object;
-    p.albedo = surface.albedo;
+    p.at = at;
     p.patch_width = stratum.patch_width;
     p.single_sided = !stratum.double_sided;
     p.material = mesh.triangle_material[at.triangle];
     const Material& material = scene.materials[p.material];
-    const bool is_there = material.alpha_mode == AlphaMode::kOpaque ||
-                          (material.alpha_mode == AlphaMode::kMask
-                               ? alphaAt(mesh, scene.materials, scene.textures, at.triangle, at.u,
-                                         at.v) >= material.alpha_cutoff
-                               : uniformFloat(hashCombine(key.list, key.index, 3)) < surface.alpha);
+    p.is_textured = material.isTextured();
+    if (!p.is_textured) {
+        const MeshSurface surface =
+            surfaceAt(mesh, scene.materials, scene.textures, at.triangle, at.u, at.v, {});
+        p.shading_normal = surface.normal_object;
+        p.albedo = surface.albedo;
+    }
+    bool is_there = true;
+    if (material.alpha_mode != AlphaMode::kOpaque) {
+        const float alpha = alphaAt(mesh, scene.materials, scene.textures, at.triangle, at.u, at.v);
+        is_there = material.alpha_mode == AlphaMode::kMask
+                       ? alpha >= material.alpha_cutoff
+                       : uniformFloat(hashCombine(key.list, key.index, 3)) < alpha;
+    }
     if (is_there) p.normal = glm::normalize(glm::cross(DVec3(e1), DVec3(e2)));
     return p;
 }
@@ -188,8 +200,7 @@ Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, cons
     const Affine group_from_mesh = group.instances.groupFromChild(at.instance);
     const double area_scale = std::max(group.instances.areaScale(at.instance), 1e-30);
     const float length_scale = float(std::sqrt(area_scale));
-    Point p = makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], at.position,
-                            listFootprint(group.nodes[node].area) / length_scale, key);
+    Point p = makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], at.position, key);
     // Drawn for the largest area scale of the transform; this orientation's may be smaller.
     DMat3 area_map = cofactor(group_from_mesh.linear);
     area_map *= (glm::dot(group_from_mesh.linear[0], area_map[0]) < 0.0 ? -1.0 : 1.0) / area_scale;
@@ -198,7 +209,7 @@ Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, cons
     const DVec3 shading = area_map * DVec3(p.shading_normal);
     p.shading_normal = Vec3(shading / std::max(glm::length(shading), 1e-30));
     p.patch_width *= length_scale;
-    p.slot = group.listed_index[at.instance];
+    p.instance = at.instance;
     return p;
 }
 
@@ -212,10 +223,10 @@ void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
     }
     out.width[lane] = patchWidthCode(p.patch_width, kFirstMetreExponent);
     out.single_sided[lane] = p.single_sided;
-    out.shading_normal[lane] = packOctahedral(p.shading_normal);
-    out.albedo[lane] = packSrgb8(p.albedo);
+    out.normal_or_triangle[lane] = p.is_textured ? p.at.triangle : packOctahedral(p.shading_normal);
+    out.albedo_or_place[lane] = p.is_textured ? packPlace({p.at.u, p.at.v}) : packSrgb8(p.albedo);
     out.material[lane] = p.material;
-    out.slot[lane] = p.slot;
+    out.instance[lane] = p.instance;
 }
 
 }  // namespace
@@ -235,18 +246,15 @@ void PointLists::makePoints(const ListName& name, uint32_t first, int count, Lis
     }
     const Mesh& mesh = scene_.meshes[name.child.index()];
     const MeshNode& node = mesh.nodes[name.node];
-    const auto makeOn = [&](const auto& cumulative_area, double area) {
-        const float footprint = listFootprint(area);
+    const auto makeOn = [&](const auto& cumulative_area) {
         makeAll([&] {
-            return makeMeshPoint(scene_, mesh, cumulative_area, node, listPosition(key), footprint,
-                                 key);
+            return makeMeshPoint(scene_, mesh, cumulative_area, node, listPosition(key), key);
         });
     };
     if (is_whole) {
-        makeOn(mesh.cumulative_area, node.area);
+        makeOn(mesh.cumulative_area);
     } else {
-        const VisibleArea& visible = visibleArea(name.child.index(), name.direction);
-        makeOn(visible.cumulative, visible.area(node));
+        makeOn(visibleArea(name.child.index(), name.direction).cumulative);
     }
 }
 

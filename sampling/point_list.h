@@ -27,16 +27,22 @@ struct ListBlock {
                                                      // alpha mask says there is no surface
     uint8_t width[kBlockPoints];                     // patchWidthCode(), in metres
     uint8_t single_sided[kBlockPoints];              // 1: not seen from behind
-    uint32_t shading_normal[kBlockPoints];           // octahedral, 2 x 16 bits
-    uint32_t albedo[kBlockPoints];                   // sRGB-encoded, 8 bits a channel
+    // Of materials without textures: the shading normal (octahedral, 2 x 16 bits) and the albedo
+    // (sRGB-encoded, 8 bits a channel). Of others the triangle and the place on it (packPlace()):
+    // what is seen there depends on how far away it is.
+    uint32_t normal_or_triangle[kBlockPoints];
+    uint32_t albedo_or_place[kBlockPoints];
     uint16_t material[kBlockPoints];
-    uint32_t slot[kBlockPoints];  // in lists of groups: the instance's place in the group
+    uint32_t instance[kBlockPoints];  // in lists of groups: of the group's InstanceStore
 };
 
 uint32_t packOctahedral(const Vec3& unit);
 Vec3 unpackOctahedral(uint32_t packed);
 uint32_t packSrgb8(const Vec3& linear);
 Vec3 unpackSrgb8(uint32_t packed);
+// Barycentrics, 16 bits each.
+uint32_t packPlace(Vec2 uv);
+Vec2 unpackPlace(uint32_t packed);
 
 // Lists grow up to here; points beyond are made anew each time.
 inline constexpr uint32_t kLongestList = 4096;

@@ -57,6 +57,7 @@ void PointWriter::add(const InstanceFrame& frame, const ListName& name, const Ru
     const KernelParams params = makeParams(context_, frame, name.child, name.node, density);
     Run run;
     run.camera_from_normal = frame.camera_from_normal;
+    run.length_scale = float(std::sqrt(frame.area_scale));
     run.child = name.child;
     run.node = name.node;
     run.direction = name.direction;

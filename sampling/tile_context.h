@@ -16,7 +16,8 @@ inline constexpr uint32_t kNotTriangles = 0xffffffffu;
 // What attributes() must know of 64 consecutive numbers.
 struct Run {
     Mat3 camera_from_normal = Mat3(1.0f);
-    ChildRef child;  // mesh or group
+    float length_scale = 1.0f;  // camera space over the child's space: root of the area scale
+    ChildRef child;             // mesh or group
     uint32_t node = 0;
     int direction = ListName::kWhole;  // of the node's list
     uint32_t first_index = 0;          // of the node's list, or of the mesh's triangles

@@ -3,6 +3,7 @@
 
 #include <core/rng.h>
 #include <sampling/node_class.h>
+#include <sampling/point_attributes.h>
 #include <scenegraph/object_id.h>
 
 #include <algorithm>
@@ -14,7 +15,6 @@ TileCut::TileCut(const Scene& scene, const View& view, const RenderSettings& set
                  const FramePlan& plan, PointLists& lists)
     : context_{scene, view, settings, lists, nullptr, {}, {}},
       plan_(plan),
-      world_from_camera_(glm::transpose(view.camera_from_world)),
       points_(context_),
       group_points_(context_, points_),
       triangles_(context_) {}
@@ -47,13 +47,7 @@ void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSampl
     ListBlock scratch;
     const ListBlock& list = context_.lists.points({run.child, run.node, run.direction}, index, 1,
                                                   run.list_length, scratch, lane);
-    sample.normal_world =
-        glm::normalize(world_from_camera_ *
-                       (run.camera_from_normal * unpackOctahedral(list.shading_normal[lane])));
-    sample.albedo = unpackSrgb8(list.albedo[lane]);
-    sample.material = list.material[lane];
-    sample.object =
-        objectId(run.child.isGroup() ? extendObjectPath(run.path, list.slot[lane]) : run.path);
+    pointAttributes(context_.scene, context_.view, run, list, lane, sub_x, sub_y, sample);
 }
 
 void TileCut::forget() {

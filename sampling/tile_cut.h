@@ -46,7 +46,6 @@ private:
 
     TileContext context_;
     const FramePlan& plan_;
-    const Mat3 world_from_camera_;
     PointWriter points_;
     GroupPoints group_points_;
     TriangleWriter triangles_;

@@ -2,6 +2,7 @@
 #include <sampling/triangle_writer.h>
 
 #include <core/rng.h>
+#include <sampling/point_attributes.h>
 #include <scenegraph/object_id.h>
 #include <scenegraph/surface_at.h>
 
@@ -34,13 +35,14 @@ void triangleAttributes(const Scene& scene, const View& view, const InstanceFram
     const Vec2 uv = intersectPlane(linear * mesh.positions[t.x] + translation,
                                    linear * mesh.positions[t.y] + translation,
                                    linear * mesh.positions[t.z] + translation, origin, direction);
-    const float footprint =
-        (view.orthographic ? 1.0f : sample.depth) / float(view.focal * std::sqrt(frame.area_scale));
     const MeshSurface surface =
-        surfaceAt(mesh, scene.materials, scene.textures, triangle, uv.x, uv.y, footprint);
+        surfaceAt(mesh, scene.materials, scene.textures, triangle, uv.x, uv.y,
+                  subpixelBeam(view, sub_x, sub_y, sample.depth, float(std::sqrt(frame.area_scale)),
+                               frame.camera_from_normal));
     sample.normal_world = glm::normalize(Mat3(glm::transpose(view.camera_from_world)) *
                                          (frame.camera_from_normal * surface.normal_object));
     sample.albedo = surface.albedo;
+    sample.finish = surface.finish;
     sample.material = mesh.triangle_material[triangle];
     sample.object = objectId(frame.path);
 }

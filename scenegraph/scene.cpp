@@ -101,6 +101,22 @@ SceneSize sceneSize(const Scene& scene) {
     return size;
 }
 
+std::vector<double> meshInstances(const Scene& scene) {
+    std::vector<double> meshes(scene.meshes.size(), 0.0), groups(scene.groups.size(), 0.0);
+    if (scene.root >= scene.groups.size()) return meshes;
+    groups[scene.root] = 1.0;
+    const std::vector<uint32_t> order = childrenFirst(scene);
+    for (auto g = order.rbegin(); g != order.rend(); ++g) {
+        const InstanceStore& instances = scene.groups[*g].instances;
+        if (groups[*g] == 0.0) continue;
+        for (size_t i = 0; i < instances.size(); ++i) {
+            const ChildRef child = instances.child(i);
+            (child.isGroup() ? groups : meshes)[child.index()] += groups[*g];
+        }
+    }
+    return meshes;
+}
+
 DBox3 sceneBounds(const Scene& scene) {
     return scene.root < scene.groups.size() ? scene.groups[scene.root].bounds : DBox3();
 }

@@ -56,6 +56,9 @@ struct SceneSize {
 };
 SceneSize sceneSize(const Scene& scene);
 
+// How often each mesh is shown, expanded: one number a mesh. O(stored instances).
+std::vector<double> meshInstances(const Scene& scene);
+
 // World-space bounds of everything.
 DBox3 sceneBounds(const Scene& scene);
 

@@ -16,13 +16,18 @@ Vec3 safeNormalize(const Vec3& v) {
     return largest > 0.0f ? glm::normalize(v / largest) : v;
 }
 
+// Nearer to edge-on a beam's cut is taken for no longer: more than the lookups along it resolve.
+constexpr float kMostStretch = 64.0f;
+
 // A place on a mesh, and looking up textures there.
 struct Place {
     const Mesh& mesh;
     const std::vector<Texture>& textures;
     UVec3 t;
     float u, v;
-    float footprint_object;
+    // The sides of a parallelogram of about the beam's cut with the surface, as shares of the
+    // triangle's edges from its first vertex; null: none.
+    Vec2 side_a = Vec2(0.0f), side_b = Vec2(0.0f);
 
     // The texture coordinates of a layer, nullptr if the mesh has none.
     const std::vector<Vec2>* uvs(int layer) const {
@@ -32,22 +37,40 @@ struct Place {
         return result && !result->empty() ? result : nullptr;
     }
 
+    void setBeam(const LookupBeam& beam) {
+        if (!(beam.diameter > 0.0f)) return;
+        const Vec3 e1 = mesh.positions[t.y] - mesh.positions[t.x],
+                   e2 = mesh.positions[t.z] - mesh.positions[t.x];
+        const Vec3 normal = glm::cross(e1, e2);
+        const float area2 = glm::dot(normal, normal);
+        if (!(area2 > 0.0f)) return;
+        const Vec3 n = safeNormalize(normal), d = safeNormalize(beam.direction);
+        // Across the beam it is as wide as the beam; along its shadow it is stretched.
+        Vec3 across = glm::cross(n, d);
+        if (!(glm::dot(across, across) > 1e-8f)) across = e1;
+        across = safeNormalize(across) * beam.diameter;
+        const float cosine = beam.direction == Vec3(0.0f) ? 1.0f : std::abs(glm::dot(n, d));
+        const Vec3 along = glm::cross(across, n) / std::max(cosine, 1.0f / kMostStretch);
+        const auto inEdges = [&](const Vec3& w) {
+            return Vec2(glm::dot(glm::cross(w, e2), normal), glm::dot(glm::cross(e1, w), normal)) /
+                   area2;
+        };
+        side_a = inEdges(across), side_b = inEdges(along);
+    }
+
     // False where there is no texture.
     bool lookUp(const TextureUse& use, Vec4& texel) const {
         const std::vector<Vec2>* layer = use.texture == kNoTexture ? nullptr : uvs(use.uv_layer);
         if (!layer) return false;
-        float footprint_uv = 0.0f;
-        if (footprint_object > 0.0f) {
-            // Object space to uv by the ratio of the triangle's areas.
-            const Vec3 e1 = mesh.positions[t.y] - mesh.positions[t.x],
-                       e2 = mesh.positions[t.z] - mesh.positions[t.x];
-            const Vec2 a = (*layer)[t.y] - (*layer)[t.x], b = (*layer)[t.z] - (*layer)[t.x];
-            const float object_area = glm::length(glm::cross(e1, e2)),
-                        uv_area = std::abs(a.x * b.y - a.y * b.x);
-            if (object_area > 0.0f)
-                footprint_uv = footprint_object * std::sqrt(uv_area / object_area);
+        const Vec2 at = interpolate(*layer, t, u, v);
+        const Texture& texture = textures[use.texture];
+        if (side_a == Vec2(0.0f)) {
+            texel = sampleTexture(texture, at, 0.0f);
+            return true;
         }
-        texel = sampleTexture(textures[use.texture], interpolate(*layer, t, u, v), footprint_uv);
+        const Vec2 a = (*layer)[t.y] - (*layer)[t.x], b = (*layer)[t.z] - (*layer)[t.x];
+        texel =
+            sampleTexture(texture, at, a * side_a.x + b * side_a.y, a * side_b.x + b * side_b.y);
         return true;
     }
 
@@ -102,13 +125,27 @@ Vec3 mappedNormal(const Place& place, const Material& material, const Vec3& norm
                          bitangent * (n.y * material.normal_scale) + normal * std::max(n.z, 1e-3f));
 }
 
+SurfaceFinish finishAt(const Place& place, const Material& material) {
+    SurfaceFinish f = plainFinish(material);
+    Vec4 texel;
+    if (place.lookUp(material.metallic_roughness_map, texel))
+        f.roughness *= texel.g, f.metallic *= texel.b;
+    if (place.lookUp(material.specular_color_map, texel))
+        f.specular = glm::min(material.specular * Vec3(texel), Vec3(1.0f)) * f.specular_edge;
+    if (place.lookUp(material.specular_map, texel))
+        f.specular *= texel.a, f.specular_edge *= texel.a;
+    if (place.lookUp(material.emissive_map, texel)) f.emissive *= Vec3(texel);
+    return f;
+}
+
 }  // namespace
 
 MeshSurface surfaceAt(const Mesh& mesh, const std::vector<Material>& materials,
                       const std::vector<Texture>& textures, uint32_t triangle, float u, float v,
-                      float footprint_object) {
-    const Place place{mesh, textures, mesh.triangles[triangle], u, v, footprint_object};
+                      const LookupBeam& beam) {
+    Place place{mesh, textures, mesh.triangles[triangle], u, v};
     const Material& material = materials[mesh.triangle_material[triangle]];
+    if (material.isTextured()) place.setBeam(beam);
     const UVec3& t = place.t;
     MeshSurface s;
     if (!mesh.normals.empty()) s.normal_object = interpolate(mesh.normals, t, u, v);
@@ -117,17 +154,24 @@ MeshSurface surfaceAt(const Mesh& mesh, const std::vector<Material>& materials,
                                      mesh.positions[t.z] - mesh.positions[t.x]);
     }
     s.normal_object = mappedNormal(place, material, safeNormalize(s.normal_object));
-    const Vec4 color = baseColor(place, material);
-    s.albedo = Vec3(color);
-    s.alpha = color.w;
-    if (Vec4 texel; place.lookUp(material.metallic_map, texel))
-        s.albedo *= 1.0f - material.metallic * texel.b;
+    s.albedo = Vec3(baseColor(place, material));
+    s.finish = finishAt(place, material);
     return s;
+}
+
+SurfaceFinish plainFinish(const Material& material) {
+    SurfaceFinish f;
+    f.metallic = material.metallic;
+    f.roughness = material.roughness;
+    f.specular = glm::min(material.specular, Vec3(1.0f)) * material.specular_weight;
+    f.specular_edge = material.specular_weight;
+    f.emissive = material.emissive;
+    return f;
 }
 
 float alphaAt(const Mesh& mesh, const std::vector<Material>& materials,
               const std::vector<Texture>& textures, uint32_t triangle, float u, float v) {
-    return baseColor({mesh, textures, mesh.triangles[triangle], u, v, 0.0f},
+    return baseColor({mesh, textures, mesh.triangles[triangle], u, v},
                      materials[mesh.triangle_material[triangle]])
         .w;
 }

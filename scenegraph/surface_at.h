@@ -4,6 +4,7 @@
 #pragma once
 
 #include <core/material.h>
+#include <core/surface.h>
 #include <scenegraph/mesh.h>
 
 namespace stipple {
@@ -11,14 +12,23 @@ namespace stipple {
 struct MeshSurface {
     Vec3 normal_object = Vec3(0);  // unit, shading normal; geometric where the mesh has none
     Vec3 albedo = Vec3(0);         // linear
-    float alpha = 1.0f;            // material x texture x vertex alpha
+    SurfaceFinish finish;
 };
 
-// At barycentrics (1 - u - v, u, v) of a triangle. footprint_object: diameter of what the lookup
-// stands for, in object space (texture filtering); 0 for the finest level.
+// What a lookup stands for (texture filtering), in object space: the surface within a beam of that
+// diameter and direction (need not be unit). Diameter 0: the finest level; direction 0: a circle.
+struct LookupBeam {
+    float diameter = 0.0f;
+    Vec3 direction = Vec3(0);
+};
+
+// At barycentrics (1 - u - v, u, v) of a triangle.
 MeshSurface surfaceAt(const Mesh& mesh, const std::vector<Material>& materials,
                       const std::vector<Texture>& textures, uint32_t triangle, float u, float v,
-                      float footprint_object);
+                      const LookupBeam& beam);
+
+// Of a material without its textures.
+SurfaceFinish plainFinish(const Material& material);
 
 // Alpha alone (for masks).
 float alphaAt(const Mesh& mesh, const std::vector<Material>& materials,

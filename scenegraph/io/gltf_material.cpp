@@ -41,6 +41,18 @@ GltfUvLayer uvLayer(const Info& info) {
     return layer;
 }
 
+// A texture info within an extension, which tinygltf leaves as it is.
+tinygltf::TextureInfo textureInfo(const tinygltf::Value& object) {
+    tinygltf::TextureInfo info;
+    info.index = object.Get("index").GetNumberAsInt();
+    if (object.Has("texCoord")) info.texCoord = object.Get("texCoord").GetNumberAsInt();
+    if (object.Has("extensions")) {
+        const tinygltf::Value& extensions = object.Get("extensions");
+        for (const std::string& key : extensions.Keys()) info.extensions[key] = extensions.Get(key);
+    }
+    return info;
+}
+
 // The number of the layer among the material's, added if it is new.
 int layerIndex(const GltfUvLayer& layer, std::vector<GltfUvLayer>& layers) {
     const auto it = std::find(layers.begin(), layers.end(), layer);
@@ -84,27 +96,35 @@ const GltfMaterial& GltfMaterials::get(int material, bool for_points, const std:
     return materials_.emplace(key, std::move(result)).first->second;
 }
 
-Vec3 GltfMaterials::dielectricSpecular(const tinygltf::Material& source, const std::string& path) {
-    constexpr float kUsual = 0.04f;
+template <class Info>
+TextureUse GltfMaterials::use(const Info& info, bool is_srgb, bool is_opaque, GltfMaterial& out,
+                              const std::string& path) {
+    if (info.index < 0) return {};
+    return {texture(info.index, is_srgb, is_opaque, path + ".index"),
+            layerIndex(uvLayer(info), out.uv_layers)};
+}
+
+void GltfMaterials::convertSpecular(const tinygltf::Material& source, Material& m,
+                                    GltfMaterial& out, const std::string& path) {
+    m.specular = Vec3(0.04f);
     const tinygltf::Value* specular = extension(source.extensions, "KHR_materials_specular");
-    if (!specular) return Vec3(kUsual);
-    const std::string place = path + ".extensions.KHR_materials_specular.";
-    const auto meanOf = [&](const char* key, bool is_srgb) {
-        if (!specular->Has(key)) return Vec4(1.0f);
-        return mean(specular->Get(key).Get("index").GetNumberAsInt(), is_srgb, place + key);
-    };
-    float factor = float(numberOf(*specular, "specularFactor", 1.0));
-    factor *= meanOf("specularTexture", false).a;
-    Vec3 color = Vec3(meanOf("specularColorTexture", true));
+    if (!specular) return;
+    m.specular_weight = float(numberOf(*specular, "specularFactor", 1.0));
     if (specular->Has("specularColorFactor")) {
         const tinygltf::Value& rgb = specular->Get("specularColorFactor");
-        for (int c = 0; c < 3; ++c) color[c] *= float(rgb.Get(c).GetNumberAsDouble());
+        for (int c = 0; c < 3; ++c) m.specular[c] *= float(rgb.Get(c).GetNumberAsDouble());
     }
-    return glm::min(kUsual * color, Vec3(1.0f)) * factor;
+    const std::string place = path + ".extensions.KHR_materials_specular.";
+    const auto textureOf = [&](const char* key, bool is_srgb) -> TextureUse {
+        if (!specular->Has(key)) return {};
+        return use(textureInfo(specular->Get(key)), is_srgb, is_srgb, out, place + key);
+    };
+    m.specular_map = textureOf("specularTexture", false);
+    m.specular_color_map = textureOf("specularColorTexture", true);
 }
 
 Material GltfMaterials::convert(const tinygltf::Material& source, bool for_points,
-                                GltfMaterial& use, const std::string& path) {
+                                GltfMaterial& out, const std::string& path) {
     const tinygltf::PbrMetallicRoughness& pbr = source.pbrMetallicRoughness;
     Material m;
     m.name = source.name;
@@ -127,49 +147,23 @@ Material GltfMaterials::convert(const tinygltf::Material& source, bool for_point
     }
 
     m.base_color = Vec3(pbr.baseColorFactor[0], pbr.baseColorFactor[1], pbr.baseColorFactor[2]);
-    Vec3 mean_base = m.base_color;
     m.alpha = m.alpha_mode == AlphaMode::kOpaque ? 1.0f : float(pbr.baseColorFactor[3]);
-    if (pbr.baseColorTexture.index >= 0) {
-        const std::string texture_path = path + ".pbrMetallicRoughness.baseColorTexture.index";
-        m.base_texture = texture(pbr.baseColorTexture.index, true,
-                                 m.alpha_mode == AlphaMode::kOpaque, texture_path);
-        mean_base *= Vec3(mean(pbr.baseColorTexture.index, true, texture_path));
-        layerIndex(uvLayer(pbr.baseColorTexture), use.uv_layers);  // the first: Mesh::uvs
-    }
+    // The first layer is Mesh::uvs.
+    m.base_texture = use(pbr.baseColorTexture, true, m.alpha_mode == AlphaMode::kOpaque, out,
+                         path + ".pbrMetallicRoughness.baseColorTexture")
+                         .texture;
     if (m.unlit) return m;
 
-    float metallic = float(pbr.metallicFactor), roughness = float(pbr.roughnessFactor);
-    if (pbr.metallicRoughnessTexture.index >= 0) {
-        const int index = pbr.metallicRoughnessTexture.index;
-        const std::string texture_path =
-            path + ".pbrMetallicRoughness.metallicRoughnessTexture.index";
-        const Vec4 texel = mean(index, false, texture_path);
-        if (metallic > 0.0f && texel.b > 0.0f) {
-            m.metallic_map = {texture(index, false, true, texture_path),
-                              layerIndex(uvLayer(pbr.metallicRoughnessTexture), use.uv_layers)};
-            m.metallic = metallic;
-        }
-        roughness *= texel.g;
-        metallic *= texel.b;
-    }
-    // Metallic-roughness as diffuse and a Phong lobe: a metal mirrors in its colour. What it
-    // mirrors of its surroundings is not drawn, but the rougher it is the more that looks like
-    // scattered light, and is counted as such. A microfacet lobe of width alpha = roughness^2 is
-    // about as wide as a Phong lobe of exponent 2 / alpha^2 - 2. Of what is mirrored, the textures'
-    // means count.
-    const float smooth = 1.0f - roughness * roughness;
-    metallic *= smooth, m.metallic *= smooth;
-    if (m.metallic_map.texture == kNoTexture) m.base_color *= 1.0f - metallic;
-    m.specular = glm::mix(dielectricSpecular(source, path), mean_base, metallic);
-    const float r4 = roughness * roughness * roughness * roughness;
-    m.shininess = std::clamp(2.0f / std::max(r4, 1e-6f) - 2.0f, 1.0f, 1000.0f);
+    m.metallic = float(pbr.metallicFactor);
+    m.roughness = float(pbr.roughnessFactor);
+    m.metallic_roughness_map = use(pbr.metallicRoughnessTexture, false, true, out,
+                                   path + ".pbrMetallicRoughness.metallicRoughnessTexture");
+    convertSpecular(source, m, out, path);
 
     if (source.normalTexture.index >= 0 && !for_points) {
-        m.normal_map = {
-            texture(source.normalTexture.index, false, true, path + ".normalTexture.index"),
-            layerIndex(uvLayer(source.normalTexture), use.uv_layers)};
+        m.normal_map = use(source.normalTexture, false, true, out, path + ".normalTexture");
         m.normal_scale = float(source.normalTexture.scale);
-        use.needs_tangents = true;
+        out.needs_tangents = true;
     }
 
     m.emissive = Vec3(source.emissiveFactor[0], source.emissiveFactor[1], source.emissiveFactor[2]);
@@ -177,12 +171,8 @@ Material GltfMaterials::convert(const tinygltf::Material& source, bool for_point
             extension(source.extensions, "KHR_materials_emissive_strength")) {
         m.emissive *= float(numberOf(*strength, "emissiveStrength", 1.0));
     }
-    if (source.emissiveTexture.index >= 0 && m.emissive != Vec3(0.0f)) {
-        m.emissive *=
-            Vec3(mean(source.emissiveTexture.index, true, path + ".emissiveTexture.index"));
-        document_.context.warnOnce(document_.name,
-                                   "emissive textures are replaced by their mean colour");
-    }
+    if (m.emissive != Vec3(0.0f))
+        m.emissive_map = use(source.emissiveTexture, true, true, out, path + ".emissiveTexture");
     return m;
 }
 

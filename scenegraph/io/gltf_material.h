@@ -46,10 +46,15 @@ private:
     const Texture::Level& picture(int image);
     // Mean of a texture's texels, as linear values.
     Vec4 mean(int texture, bool is_srgb, const std::string& path);
-    Material convert(const tinygltf::Material& source, bool for_points, GltfMaterial& use,
+    Material convert(const tinygltf::Material& source, bool for_points, GltfMaterial& out,
                      const std::string& path);
-    // Reflectance at normal incidence of what is no metal.
-    Vec3 dielectricSpecular(const tinygltf::Material& source, const std::string& path);
+    // KHR_materials_specular.
+    void convertSpecular(const tinygltf::Material& source, Material& m, GltfMaterial& out,
+                         const std::string& path);
+    // Info: a texture info with or without more. No texture where there is none.
+    template <class Info>
+    TextureUse use(const Info& info, bool is_srgb, bool is_opaque, GltfMaterial& out,
+                   const std::string& path);
 
     const GltfDocument& document_;
     Scene& scene_;

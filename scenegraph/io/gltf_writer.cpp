@@ -40,16 +40,26 @@ void addExtension(tinygltf::Model& model, T& target, const std::string& name,
     addOnce(model.extensionsUsed, name);
 }
 
+// Info: any kind of texture info. Textures and layers of coordinates have the scene's numbers.
+template <class Info>
+void setTexture(Info& info, const TextureUse& use) {
+    info.index = use.texture;
+    if (use.texture != kNoTexture) info.texCoord = use.uv_layer;
+}
+
+tinygltf::Value textureValue(const TextureUse& use) {
+    return tinygltf::Value(tinygltf::Value::Object{{"index", tinygltf::Value(use.texture)},
+                                                   {"texCoord", tinygltf::Value(use.uv_layer)}});
+}
+
 void addMaterial(tinygltf::Model& model, const Material& material) {
     tinygltf::Material& target = model.materials.emplace_back();
     target.name = material.name;
     const Vec3& color = material.base_color;
     target.pbrMetallicRoughness.baseColorFactor =
         Numbers{color.x, color.y, color.z, material.alpha};
-    target.pbrMetallicRoughness.metallicFactor = 0.0;
-    // Blinn-Phong's exponent n as microfacet roughness: n = 2 / roughness^4 - 2.
-    target.pbrMetallicRoughness.roughnessFactor =
-        std::pow(2.0 / (2.0 + std::max(0.0f, material.shininess)), 0.25);
+    target.pbrMetallicRoughness.metallicFactor = material.metallic;
+    target.pbrMetallicRoughness.roughnessFactor = material.roughness;
     target.doubleSided = material.double_sided;
     if (material.alpha_mode == AlphaMode::kMask) target.alphaMode = "MASK";
     if (material.alpha_mode == AlphaMode::kBlend) target.alphaMode = "BLEND";
@@ -65,9 +75,21 @@ void addMaterial(tinygltf::Model& model, const Material& material) {
                      {{"emissiveStrength", numberValue(strength)}});
     }
 
+    setTexture(target.normalTexture, material.normal_map);
+    target.normalTexture.scale = material.normal_scale;
+    setTexture(target.pbrMetallicRoughness.metallicRoughnessTexture,
+               material.metallic_roughness_map);
+    setTexture(target.emissiveTexture, material.emissive_map);
+
     constexpr float kPlainReflectance = 0.04f;  // what glTF gives to a dielectric
-    addExtension(model, target, "KHR_materials_specular",
-                 {{"specularColorFactor", colorValue(material.specular / kPlainReflectance)}});
+    tinygltf::Value::Object specular = {
+        {"specularFactor", numberValue(material.specular_weight)},
+        {"specularColorFactor", colorValue(material.specular / kPlainReflectance)}};
+    if (material.specular_map.texture != kNoTexture)
+        specular["specularTexture"] = textureValue(material.specular_map);
+    if (material.specular_color_map.texture != kNoTexture)
+        specular["specularColorTexture"] = textureValue(material.specular_color_map);
+    addExtension(model, target, "KHR_materials_specular", std::move(specular));
     if (material.translucency > 0.0f) {
         addExtension(model, target, "KHR_materials_diffuse_transmission",
                      {{"diffuseTransmissionFactor", numberValue(material.translucency)}});
@@ -115,6 +137,10 @@ std::map<std::string, int> addVertices(tinygltf::Model& model, const Mesh& mesh)
         attributes["NORMAL"] = addVertexData(model, mesh.normals, TINYGLTF_TYPE_VEC3);
     if (!mesh.uvs.empty())
         attributes["TEXCOORD_0"] = addVertexData(model, mesh.uvs, TINYGLTF_TYPE_VEC2);
+    for (size_t i = 0; i < mesh.more_uvs.size() && !mesh.uvs.empty(); ++i) {
+        attributes["TEXCOORD_" + std::to_string(i + 1)] =
+            addVertexData(model, mesh.more_uvs[i], TINYGLTF_TYPE_VEC2);
+    }
     if (!mesh.colors.empty())
         attributes["COLOR_0"] = addVertexData(model, mesh.colors, TINYGLTF_TYPE_VEC4);
     return attributes;
@@ -122,8 +148,8 @@ std::map<std::string, int> addVertices(tinygltf::Model& model, const Mesh& mesh)
 
 size_t fileBytes(const Mesh& mesh) {
     return mesh.positions.size() * sizeof(Vec3) + mesh.normals.size() * sizeof(Vec3) +
-           mesh.uvs.size() * sizeof(Vec2) + mesh.colors.size() * sizeof(Vec4) +
-           mesh.triangles.size() * sizeof(UVec3);
+           mesh.uvs.size() * sizeof(Vec2) * (1 + mesh.more_uvs.size()) +
+           mesh.colors.size() * sizeof(Vec4) + mesh.triangles.size() * sizeof(UVec3);
 }
 
 // One primitive a material. Returns the mesh's index.

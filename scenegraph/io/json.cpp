@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <core/nearest_name.h>
 #include <scenegraph/io/json.h>
 
 #include <algorithm>
@@ -106,38 +107,56 @@ std::string lineAndColumn(std::string_view text, size_t byte) {
            ", column " + std::to_string(1 + column);
 }
 
+bool matches(const Json& schema_document, const Json& value) {
+    valijson::Schema schema;
+    valijson::SchemaParser parser;
+    parser.populateSchema(valijson::adapters::NlohmannJsonAdapter(schema_document), schema);
+    return valijson::Validator().validate(schema, valijson::adapters::NlohmannJsonAdapter(value),
+                                          nullptr);
+}
+
 // The schemas within `schema` that speak about `value`: itself, references, and the branches that
-// apply.
-void collectSchemas(const Json& root, const Json& schema, std::vector<const Json*>& found) {
+// apply. Conditions must not refer to definitions.
+void collectSchemas(const Json& root, const Json& schema, const Json& value,
+                    std::vector<const Json*>& found) {
     if (!schema.is_object()) return;
     found.push_back(&schema);
     if (const auto ref = schema.find("$ref"); ref != schema.end()) {
-        collectSchemas(root, root.at(Json::json_pointer(ref->get<std::string>().substr(1))), found);
+        collectSchemas(root, root.at(Json::json_pointer(ref->get<std::string>().substr(1))), value,
+                       found);
     }
     for (const char* key : {"allOf", "oneOf", "anyOf"}) {
         if (!schema.contains(key)) continue;
-        for (const Json& branch : schema[key]) collectSchemas(root, branch, found);
+        for (const Json& branch : schema[key]) collectSchemas(root, branch, value, found);
     }
-    if (schema.contains("then")) collectSchemas(root, schema["then"], found);
+    if (schema.contains("then") && matches(schema["if"], value))
+        collectSchemas(root, schema["then"], value, found);
 }
 
-// The values that the schema allows at `path`, as text; empty if it lists none.
-std::string allowedValues(const Json& root, const JsonPath& path) {
+// The schemas that speak about what stands at `path` in `document`.
+std::vector<const Json*> schemasAt(const Json& root, const JsonPath& path, const Json& document) {
     std::vector<const Json*> schemas;
-    collectSchemas(root, root, schemas);
+    const Json* value = &document;
+    collectSchemas(root, root, *value, schemas);
     for (const std::string& step : path) {
+        value = value->is_array() ? &value->at(std::stoul(step)) : &value->at(step);
         std::vector<const Json*> next;
         for (const Json* schema : schemas) {
             const auto properties = schema->find("properties");
             if (properties != schema->end() && properties->contains(step)) {
-                collectSchemas(root, (*properties)[step], next);
+                collectSchemas(root, (*properties)[step], *value, next);
             } else if (schema->contains("additionalProperties")) {
-                collectSchemas(root, (*schema)["additionalProperties"], next);
+                collectSchemas(root, (*schema)["additionalProperties"], *value, next);
             }
-            if (schema->contains("items")) collectSchemas(root, (*schema)["items"], next);
+            if (schema->contains("items")) collectSchemas(root, (*schema)["items"], *value, next);
         }
         schemas = std::move(next);
     }
+    return schemas;
+}
+
+// The values that the schemas allow, as text; empty if they list none.
+std::string allowedValues(const std::vector<const Json*>& schemas) {
     std::string list;
     for (const Json* schema : schemas) {
         if (!schema->contains("enum")) continue;
@@ -145,6 +164,23 @@ std::string allowedValues(const Json& root, const JsonPath& path) {
             list += (list.empty() ? "" : ", ") + value.dump();
     }
     return list;
+}
+
+// The keys that the schemas name, where one that knows no others names all.
+std::vector<std::string> knownKeys(const std::vector<const Json*>& schemas) {
+    std::vector<std::string> keys;
+    for (const Json* schema : schemas) {
+        if (!schema->contains("properties")) continue;
+        for (const auto& [key, unused] : (*schema)["properties"].items()) {
+            const bool is_refused =
+                std::any_of(schemas.begin(), schemas.end(), [&key = key](const Json* other) {
+                    return other->value("additionalProperties", Json()) == false &&
+                           !(other->contains("properties") && (*other)["properties"].contains(key));
+                });
+            if (!is_refused) keys.push_back(key);
+        }
+    }
+    return keys;
 }
 
 const Json* valueAt(const Json& root, const JsonPath& path) {
@@ -247,8 +283,11 @@ std::optional<JsonSchema::Problem> JsonSchema::firstProblem(const Json& value) c
     const size_t quote = text.rfind(": '");
     if (text.find("could not be validated using 'properties'") != std::string::npos &&
         quote != std::string::npos) {
-        problem.message =
-            "unknown key " + inQuotes(text.substr(quote + 3, text.rfind('\'') - quote - 3));
+        const std::string key = text.substr(quote + 3, text.rfind('\'') - quote - 3);
+        problem.message = "unknown key " + inQuotes(key);
+        const std::string nearest =
+            nearestName(key, knownKeys(schemasAt(impl_->document, problem.path, value)));
+        if (!nearest.empty()) problem.message += "; did you mean " + inQuotes(nearest) + "?";
         return problem;
     }
     const Json& culprit = *valueAt(value, problem.path);
@@ -260,7 +299,7 @@ std::optional<JsonSchema::Problem> JsonSchema::firstProblem(const Json& value) c
     } else if (is_type) {
         problem.message += std::string(", got an ") + culprit.type_name();
     }
-    if (const std::string allowed = allowedValues(impl_->document, problem.path);
+    if (const std::string allowed = allowedValues(schemasAt(impl_->document, problem.path, value));
         !allowed.empty()) {
         problem.message = oneLine(culprit.dump(-1, ' ', true), 60) + " is none of " + allowed;
     }

@@ -115,10 +115,13 @@ Material convert(const tinyobj::material_t& source, MtlTextures& textures) {
     m.base_color = linearColor(colorOf(source.diffuse));
     m.emissive = colorOf(source.emission);
     const float shininess = std::clamp(float(source.shininess), 1.0f, 1000.0f);
-    // MTL's highlight is Ks cos^Ns where a white surface is 1: with our normalized lobe, this.
-    if (source.illum != 1)
-        m.specular = glm::min(colorOf(source.specular), Vec3(1.0f)) * (2.0f / (shininess + 2.0f));
-    m.shininess = shininess;
+    // MTL's highlight is Ks cos^Ns of the half angle, of which a microfacet lobe of width a with
+    // Ns = 2 / a^2 - 2 has the shape, and with this reflectance the height.
+    if (source.illum != 1) {
+        m.specular = glm::min(colorOf(source.specular), Vec3(1.0f)) *
+                     std::min(8.0f / (shininess + 2.0f), 1.0f);
+    }
+    m.roughness = std::pow(2.0f / (shininess + 2.0f), 0.25f);
     m.alpha = source.dissolve >= 0.0f && source.dissolve < 1.0f ? float(source.dissolve) : 1.0f;
     // A picture's alpha counts where the file says so.
     if (m.alpha < 1.0f || !source.alpha_texname.empty()) m.alpha_mode = AlphaMode::kBlend;

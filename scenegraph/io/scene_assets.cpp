@@ -13,7 +13,8 @@ namespace stipple {
 
 namespace {
 
-ChildRef loadFile(SceneReader& reader, const Json& asset, const JsonPath& path) {
+// What a file holds, loaded once.
+ChildRef loadOnce(SceneReader& reader, const Json& asset, const JsonPath& path) {
     const JsonPath file_path = joined(path, {"file"});
     const std::string& file = asset["file"].get_ref<const std::string&>();
     const std::filesystem::path full = reader.file(asset["file"], file_path);
@@ -32,6 +33,17 @@ ChildRef loadFile(SceneReader& reader, const Json& asset, const JsonPath& path) 
     reader.scene.lighting.suns.resize(n_suns);
     reader.scene.lighting.points.resize(n_points);
     return reader.files[full.string()] = child;
+}
+
+ChildRef loadFile(SceneReader& reader, const std::string& name, const Json& asset,
+                  const JsonPath& path) {
+    const ChildRef model = loadOnce(reader, asset, path);
+    double scale = 1.0;
+    readMember(asset, "scale", scale);
+    if (scale == 1.0) return model;
+    const ChildRef scaled = addEmptyGroup(reader.scene, oneLine(name));
+    reader.scene.groups[scaled.index()].instances.add(model, {DMat3(scale), DVec3(0.0)});
+    return scaled;
 }
 
 // May run in several threads; `mutex` guards the reader.
@@ -253,7 +265,7 @@ void readAssets(SceneReader& reader, const Json& assets) {
         }
         reader.children[job.name] =
             job.result ? addGenerated(reader, job.name, std::move(*job.result), path)
-                       : loadFile(reader, *job.asset, path);
+                       : loadFile(reader, job.name, *job.asset, path);
         job.result.reset();
     }
 }

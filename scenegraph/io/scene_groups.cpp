@@ -5,6 +5,7 @@
 #include <scenegraph/io/schemas.h>
 #include <scenegraph/io/transform.h>
 
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -149,17 +150,19 @@ struct ScatterRule {
 TriangleSurface assetTriangles(SceneReader& reader, ChildRef asset, const JsonPath& path) {
     std::vector<SurfacePart> parts;
     double n_triangles = 0.0;
-    const auto addMesh = [&](ChildRef child, const Affine& group_from_mesh) {
-        const Mesh& mesh = reader.scene.meshes[child.index()];
-        parts.push_back({&mesh, group_from_mesh});
-        n_triangles += double(mesh.triangles.size());
+    const std::function<void(ChildRef, const Affine&)> add = [&](ChildRef child,
+                                                                 const Affine& asset_from_child) {
+        if (!child.isGroup()) {
+            const Mesh& mesh = reader.scene.meshes[child.index()];
+            parts.push_back({&mesh, asset_from_child});
+            n_triangles += double(mesh.triangles.size());
+            return;
+        }
+        const InstanceStore& nodes = reader.scene.groups[child.index()].instances;
+        for (size_t i = 0; i < nodes.size(); ++i)
+            add(nodes.child(i), asset_from_child * nodes.groupFromChild(i));
     };
-    if (asset.isGroup()) {
-        const InstanceStore& nodes = reader.scene.groups[asset.index()].instances;
-        for (size_t i = 0; i < nodes.size(); ++i) addMesh(nodes.child(i), nodes.groupFromChild(i));
-    } else {
-        addMesh(asset, Affine());
-    }
+    add(asset, Affine());
     reader.context.budget.require(n_triangles * sizeof(double), reader.where(path),
                                   "the areas of its triangles");
     return TriangleSurface(std::move(parts));
@@ -306,8 +309,11 @@ void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Jso
     if (buffer) buffer->addTo(store);
     reader.context.throwIfCancelled();
     if (rule) {
+        const size_t before = store.size();
         withPlace(reader, scatter_path,
                   [&] { scatter(rule->params, rule->surface, reader.pool, store); });
+        if (store.size() == before && rule->params.count > 0)
+            reader.context.warnOnce(reader.where(scatter_path), "nothing found a place");
     }
     reader.context.throwIfCancelled();
     if (grid) withPlace(reader, grid_path, [&] { placeGrid(*grid, reader.pool, store); });

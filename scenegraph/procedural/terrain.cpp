@@ -189,9 +189,8 @@ void appendWater(const HeightField& field, double level, uint64_t key, Generated
     Material water;
     water.name = "water";
     water.base_color = Vec3(1.0f);
-    water.specular = Vec3(0.05f);
-    water.shininess = 90.0f;
-    water.emissive = Vec3(0.1f, 0.145f, 0.2f);  // the sky it mirrors
+    water.specular = Vec3(0.02f);
+    water.roughness = 0.15f;
     terrain.materials.push_back(water);
 }
 

@@ -22,6 +22,7 @@ struct RayHit {
     float t = kInfinity;          // infinite: nothing
     Vec3 normal_world = Vec3(0);  // unit, shading normal
     Vec3 albedo = Vec3(0);
+    SurfaceFinish finish;
     uint32_t material = 0;
     uint32_t object = 0;
 };

@@ -9,12 +9,22 @@
 
 namespace stipple {
 
+// How a surface treats light, beside its base colour: a material's values times its textures'.
+struct SurfaceFinish {
+    float metallic = 0.0f;
+    float roughness = 1.0f;
+    Vec3 specular = Vec3(0);     // reflectance of what is no metal, at normal incidence ...
+    float specular_edge = 1.0f;  // ... and at grazing incidence
+    Vec3 emissive = Vec3(0);     // linear radiance
+};
+
 struct SurfaceSample {
     float depth = kInfinity;         // camera z; infinite where there is nothing
     Vec3 position_camera = Vec3(0);  // relative to the eye
     Vec3 normal_world =
         Vec3(0, 1, 0);      // unit, shading normal, on the side the asset's author gave it
     Vec3 albedo = Vec3(0);  // linear base colour: material x texture x vertex colour
+    SurfaceFinish finish;
     uint32_t material = 0;  // index into Scene::materials
     uint32_t object = 0;    // hash of the instance path, 0 where there is nothing
 };

@@ -175,4 +175,20 @@ Vec4 sampleTexture(const Texture& texture, Vec2 uv, float footprint_uv) {
     return sum.color();
 }
 
+Vec4 sampleTexture(const Texture& texture, Vec2 uv, Vec2 side_a, Vec2 side_b) {
+    if (texture.levels.empty()) return Vec4(1.0f);
+    const Vec2 size(texture.levels[0].width, texture.levels[0].height);
+    float a = glm::length(side_a * size), b = glm::length(side_b * size);
+    if (a < b) std::swap(a, b), std::swap(side_a, side_b);
+    // Taps no farther apart than they are wide, and none where the texels are wider than the area.
+    const float taps = std::clamp(std::ceil(a / std::max(b, 1.0f)), 1.0f, float(kMostTextureTaps));
+    const float footprint_uv = std::max(a / taps, b) / std::max(size.x, size.y);
+    if (!(taps > 1.0f)) return sampleTexture(texture, uv, footprint_uv);
+    Weighted sum;
+    for (float i = 0.5f; i < taps; i += 1.0f) {
+        sum.add(sampleTexture(texture, uv + side_a * (i / taps - 0.5f), footprint_uv), 1.0f / taps);
+    }
+    return sum.color();
+}
+
 }  // namespace stipple

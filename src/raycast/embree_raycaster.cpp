@@ -183,11 +183,6 @@ bool areCoherent(const Ray* rays, size_t count) {
     return true;
 }
 
-bool hasTextures(const Material& m) {
-    return m.base_texture != kNoTexture || m.normal_map.texture != kNoTexture ||
-           m.metallic_map.texture != kNoTexture;
-}
-
 class EmbreeRayCaster : public RayCaster {
 public:
     EmbreeRayCaster(const Scene& scene, const DVec3& origin_world, int n_threads)
@@ -225,7 +220,7 @@ private:
         if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
         if (!isNested(r.hit))
             place = placeOf(level, r.hit.instID[0], r.hit.geomID, r.hit.primID, r.hit.u, r.hit.v);
-        hit = attributesAt(place, r.ray.tfar, footprint_per_t);
+        hit = attributesAt(place, ray, r.ray.tfar, footprint_per_t);
     }
 
     // together: the packet is traversed as one rather than ray by ray. Returns whether its rays
@@ -261,12 +256,13 @@ private:
             if (r.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
             hits[i] = attributesAt(placeOf(level, r.hit.instID[0][i], r.hit.geomID[i],
                                            r.hit.primID[i], r.hit.u[i], r.hit.v[i]),
-                                   r.ray.tfar[i], footprint_per_t);
+                                   rays[i], r.ray.tfar[i], footprint_per_t);
         }
         return changes <= kFewChanges;
     }
 
-    RayHit attributesAt(const HitPlace& place, float t, float footprint_per_t) const {
+    RayHit attributesAt(const HitPlace& place, const Ray& ray, float t,
+                        float footprint_per_t) const {
         const Scene& scene = *scenes_.scene;
         DMat3 world_from_object(1.0);
         uint64_t path = 0;
@@ -288,23 +284,27 @@ private:
         // it.
         const DMat3 area_scale = cofactor(world_from_object);
         const double side = glm::determinant(world_from_object) < 0.0 ? -1.0 : 1.0;
-        float footprint_object = 0.0f;
-        if (hasTextures(scene.materials[material])) {
+        LookupBeam beam;
+        if (scene.materials[material].isTextured()) {
             const UVec3& v = part.mesh->triangles[triangle];
             const DVec3 a(part.mesh->positions[v.x]), b(part.mesh->positions[v.y]),
                 c(part.mesh->positions[v.z]);
             const DVec3 area_object = glm::cross(b - a, c - a);
             const double length_scale =
                 std::sqrt(glm::length(area_scale * area_object) / glm::length(area_object));
-            if (length_scale > 0.0) footprint_object = float(footprint_per_t * t / length_scale);
+            if (length_scale > 0.0) beam.diameter = float(footprint_per_t * t / length_scale);
+            // Scaled to length 1 or so before floats take it.
+            const DVec3 direction = glm::transpose(area_scale) * DVec3(ray.direction);
+            beam.direction = Vec3(direction / std::max(glm::length(direction), 1e-300));
         }
         const MeshSurface surface = surfaceAt(*part.mesh, scene.materials, scene.textures, triangle,
-                                              place.u, place.v, footprint_object);
+                                              place.u, place.v, beam);
 
         RayHit hit;
         hit.t = t;
         hit.normal_world = Vec3(glm::normalize(area_scale * DVec3(surface.normal_object) * side));
         hit.albedo = surface.albedo;
+        hit.finish = surface.finish;
         hit.material = material;
         hit.object = objectId(path);
         return hit;

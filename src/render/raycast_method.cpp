@@ -66,6 +66,7 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
                 camera_from_world * (batch.rays[r].origin + batch.rays[r].direction * hit.t);
             sample.normal_world = hit.normal_world;
             sample.albedo = hit.albedo;
+            sample.finish = hit.finish;
             sample.material = hit.material;
             sample.object = hit.object;
             sum.add(sample, shade(sample, materials[hit.material], lighting, view));

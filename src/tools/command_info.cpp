@@ -51,9 +51,12 @@ Json infoJson(const Scene& scene, const std::vector<std::string>& warnings) {
                                   {"triangles", jsonCount(group.triangles_total)}});
     }
     json["assets"] = Json::array();
-    for (const Mesh& mesh : scene.meshes) {
+    const std::vector<double> shown = meshInstances(scene);
+    for (size_t i = 0; i < scene.meshes.size(); ++i) {
+        const Mesh& mesh = scene.meshes[i];
         json["assets"].push_back({{"name", mesh.name},
                                   {"triangles", mesh.triangles.size()},
+                                  {"instances", jsonCount(shown[i])},
                                   {"vertices", mesh.positions.size()},
                                   {"bytes", mesh.bytes()}});
     }
@@ -79,6 +82,11 @@ std::string groupedDigits(double count) {
     return result;
 }
 
+// "1 group", "1,025 groups"
+std::string counted(double count, const std::string& noun) {
+    return groupedDigits(count) + " " + noun + (count == 1.0 ? "" : "s");
+}
+
 std::string byteSize(double bytes) {
     char text[64];
     std::snprintf(text, sizeof text, bytes < 1e6 ? "%.1f kB" : "%.1f MB",
@@ -99,7 +107,8 @@ void printInfo(const Json& info) {
     std::ostream& out = std::cout;
     out << "scene       " << info["path"].get<std::string>() << "\n"
         << "instances   " << groupedDigits(info["instances"]) << " ("
-        << groupedDigits(info["instances_stored"]) << " stored)\n"
+        << counted(info["instances_stored"], "record") << " in "
+        << counted(double(info["groups"].size()), "group") << ")\n"
         << "triangles   " << groupedDigits(info["triangles_unique"]) << " unique, "
         << groupedDigits(info["triangles_total"]) << " expanded\n"
         << "memory      " << byteSize(info["bytes"]) << ", of that "
@@ -110,15 +119,15 @@ void printInfo(const Json& info) {
     out << "groups\n";
     for (const Json& group : info["groups"]) {
         out << "  " << group["name"].get<std::string>() << ": depth " << group["depth"] << ", "
-            << groupedDigits(group["instances"]) << " instances ("
-            << groupedDigits(group["instances_stored"]) << " stored), "
-            << groupedDigits(group["triangles"]) << " triangles" << (group["root"] ? ", root" : "")
-            << "\n";
+            << counted(group["instances"], "instance") << " ("
+            << counted(group["instances_stored"], "record") << "), "
+            << counted(group["triangles"], "triangle") << (group["root"] ? ", root" : "") << "\n";
     }
     out << "assets\n";
     for (const Json& asset : info["assets"]) {
-        out << "  " << asset["name"].get<std::string>() << ": " << groupedDigits(asset["triangles"])
-            << " triangles, " << byteSize(asset["bytes"]) << "\n";
+        out << "  " << asset["name"].get<std::string>() << ": "
+            << counted(asset["triangles"], "triangle") << ", "
+            << counted(asset["instances"], "instance") << ", " << byteSize(asset["bytes"]) << "\n";
     }
 }
 

@@ -21,7 +21,7 @@ std::string lowerExtension(const std::string& path) {
 
 void checkOutputFile(const std::string& option, const std::string& path,
                      const std::vector<std::string>& extensions) {
-    if (path.starts_with("--"))
+    if (path.starts_with("-"))
         throw Error(ErrorCode::kInvalidArgument, option, "needs a file, got '" + path + "'");
     const bool known =
         std::find(extensions.begin(), extensions.end(), lowerExtension(path)) != extensions.end();

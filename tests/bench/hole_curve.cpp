@@ -28,7 +28,8 @@ double emptyShare(const Mesh& mesh, Sampler sampler, int k) {
         std::vector<uint8_t> hit(kSide * kSide, 0);
         for (uint32_t i = 0; i < uint32_t(k * kSide * kSide); ++i) {
             const PointKey key{sampler, list, i};
-            const MeshPoint p = meshPointAt(mesh, mesh.nodes[0], listPosition(key), key);
+            const MeshPoint p =
+                meshPointAt(mesh.cumulative_area, mesh.nodes[0], listPosition(key), key);
             const UVec3& t = mesh.triangles[p.triangle];
             const Vec3 q = mesh.positions[t.x] * (1 - p.u - p.v) + mesh.positions[t.y] * p.u +
                            mesh.positions[t.z] * p.v;

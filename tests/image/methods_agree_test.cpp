@@ -6,6 +6,8 @@
 #include <render/renderer.h>
 #include <scenegraph/procedural/generators.h>
 
+#include <array>
+
 namespace stipple {
 namespace {
 
@@ -104,6 +106,121 @@ TEST(MethodsAgree, allAsPointsIsAsGood) {
     const Image picture = render(scene, r);
     EXPECT_GE(compareImages(picture, reference, pool).psnr, 29.0);
     EXPECT_LT(std::abs(tileMeans(picture, reference).mean), 0.02);
+}
+
+Texture checker(int texels, std::array<uint8_t, 3> a, std::array<uint8_t, 3> b, bool srgb) {
+    Texture t;
+    t.srgb = srgb;
+    t.levels.push_back({texels, texels, {}});
+    for (int i = 0; i < texels * texels; ++i) {
+        const auto& c = (i / texels * 8 / texels + i % texels * 8 / texels) % 2 ? a : b;
+        t.levels[0].rgba.insert(t.levels[0].rgba.end(), {c[0], c[1], c[2], 255});
+    }
+    buildMipmaps(t);
+    return t;
+}
+
+// A ball whose colour, metalness, roughness, normals and emission vary: one near, and 27 small
+// ones, turned, mirrored and stretched, in a group that is placed often.
+Scene texturedScene() {
+    Scene scene;
+    scene.path = "test";
+    scene.lighting.suns.push_back({glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(3.0f)});
+    scene.textures = {checker(128, {230, 210, 190}, {120, 40, 20}, true),
+                      checker(64, {0, 220, 0}, {0, 80, 255}, false),
+                      checker(128, {128, 128, 255}, {160, 110, 240}, false),
+                      checker(16, {0, 0, 0}, {0, 60, 160}, true)};
+    GeneratedMesh ball = makePrimitive("sphere", 6000, Vec3(1.0f));
+    for (const Vec3& p : ball.mesh.positions) ball.mesh.uvs.push_back(Vec2(p.x, p.y + 0.5f * p.z));
+    Material& m = ball.materials[0];
+    m.base_texture = 0;
+    m.metallic = 1.0f;
+    m.specular = Vec3(0.04f);
+    m.emissive = Vec3(2.0f);
+    m.metallic_roughness_map.texture = 1;
+    m.normal_map.texture = 2;
+    m.emissive_map.texture = 3;
+    const uint32_t mesh = addMesh(scene, std::move(ball));
+    Group many, root;
+    many.name = "many", root.name = "root";
+    many.instances = InstanceStore(DBox3{DVec3(-4), DVec3(4)});
+    for (int i = 0; i < 27; ++i) {
+        const double c = std::cos(0.7 * i), s = std::sin(0.7 * i);
+        const DMat3 turn(c, 0, -s, 0, 1, 0, s, 0, c);
+        const DMat3 scale = i % 3 == 0   ? DMat3(0.6)
+                            : i % 3 == 1 ? DMat3(-0.5, 0, 0, 0, 0.5, 0, 0, 0, 0.5)
+                                         : DMat3(0.3, 0, 0, 0, 0.8, 0, 0, 0, 0.5);
+        many.instances.add(ChildRef::mesh(mesh),
+                           {turn * scale, 1.7 * DVec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)});
+    }
+    root.instances = InstanceStore(DBox3{DVec3(-60), DVec3(60)});
+    for (int i = 0; i < 12; ++i) {
+        root.instances.add(ChildRef::group(0),
+                           {DMat3(1.0), DVec3(6.0 * (i % 6) - 15.0, 6.0 * (i / 6), -12.0)});
+    }
+    root.instances.add(ChildRef::mesh(mesh), {DMat3(3.0), DVec3(0, 3, 6)});
+    scene.groups.push_back(std::move(many));
+    scene.groups.push_back(std::move(root));
+    scene.root = 1;
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    return scene;
+}
+
+TEST(MethodsAgree, texturesOfAllKindsLookTheSame) {
+    const Scene scene = texturedScene();
+    FrameRequest r = request(DVec3(0));
+    r.camera = lookAt(DVec3(0, 6, 26), DVec3(0, 3, 0));
+    const Image reference = castRays(scene, r);
+    ThreadPool pool(2);
+    r.settings.method = Method::kPoints;
+    for (const double threshold : {r.settings.area_threshold, 100.0}) {
+        r.settings.area_threshold = threshold;  // the higher, the more are points
+        const Image picture = render(scene, r);
+        EXPECT_GE(compareImages(picture, reference, pool).psnr, 30.0);
+        EXPECT_LT(std::abs(tileMeans(picture, reference).mean), 0.01);
+    }
+    // Pictures of other sizes show finer levels: never coarser ones than the view asks for.
+    r.settings.area_threshold = RenderSettings().area_threshold;
+    r.settings.width = 120, r.settings.height = 80;
+    const Image small = castRays(scene, r);
+    r.settings.method = Method::kPoints;
+    EXPECT_GE(compareImages(render(scene, r), small, pool).psnr, 30.0);
+}
+
+TEST(MethodsAgree, aCheckerboardRunsToTheHorizonWithoutMoire) {
+    Scene scene;
+    scene.path = "test";
+    scene.lighting.suns.push_back({glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(3.0f)});
+    scene.textures = {checker(128, {240, 240, 240}, {20, 20, 20}, true)};
+    Group root;
+    root.name = "root";
+    for (const int triangles : {2, 20000}) {
+        GeneratedMesh plane = makePrimitive("plane", triangles, Vec3(1.0f));
+        for (const Vec3& p : plane.mesh.positions)
+            plane.mesh.uvs.push_back(150.0f * Vec2(p.x, p.z));
+        plane.materials[0].base_texture = 0;
+        root.instances = InstanceStore(DBox3{DVec3(-1), DVec3(1)});
+        scene.materials.clear();
+        scene.meshes.clear();
+        scene.groups.clear();
+        root.instances.add(ChildRef::mesh(addMesh(scene, std::move(plane))),
+                           {DMat3(600.0), DVec3(0)});
+        scene.groups.push_back(root);
+        ThreadPool pool(2);
+        buildScene(scene, pool);
+        FrameRequest r = request(DVec3(0));
+        r.camera = lookAt(DVec3(3, 1.7, 20), DVec3(0, 0.9, 0));
+        r.settings.width = 160, r.settings.height = 108;
+        r.settings.method = Method::kRaycast;
+        r.settings.samples = 256;
+        const Image reference = render(scene, r);
+        r.settings.method = Method::kPoints;
+        r.settings.samples = RenderSettings().samples;
+        EXPECT_GE(compareImages(render(scene, r), reference, pool).psnr, 36.0);
+        r.settings.subpixels = 1;
+        EXPECT_GE(compareImages(render(scene, r), reference, pool).psnr, 30.0);
+    }
 }
 
 TEST(MethodsAgree, sameBitsForAnyThreadsAndCaches) {

@@ -122,6 +122,32 @@ TEST(CoreTexture, footprintChoosesTheLevelAndBlendsBetween) {
     EXPECT_NEAR(sampleTexture(t, dark, 1000.0f).r, 0.5f, 0.01f);
 }
 
+TEST(CoreTexture, aLongFootprintBlursAlongItOnly) {
+    // Stripes of single texels, alternating along u.
+    std::vector<uint8_t> rgba;
+    for (int i = 0; i < 64 * 64; ++i) {
+        const uint8_t v = i % 2 ? 255 : 0;
+        rgba.insert(rgba.end(), {v, v, v, 255});
+    }
+    Texture t = makeTexture(64, 64, rgba);
+    buildMipmaps(t);
+    const float texel = 1.0f / 64;
+    const Vec2 dark(0.5f + 0.5f * texel, 0.5f);
+    const Vec2 thin(0.5f * texel, 0.0f);
+    for (const float length : {2.0f, 8.0f, float(kMostTextureTaps)}) {
+        const Vec2 along(0.0f, length * texel);
+        EXPECT_NEAR(sampleTexture(t, dark, thin, along).r, 0.0f, 1e-5f);
+        EXPECT_NEAR(sampleTexture(t, dark, along, thin).r, 0.0f, 1e-5f);
+        EXPECT_NEAR(sampleTexture(t, dark, Vec2(length * texel, 0), Vec2(0, texel)).r, 0.5f, 0.01f);
+    }
+    // Longer than the lookups reach, it becomes wider.
+    EXPECT_NEAR(sampleTexture(t, dark, thin, Vec2(0.0f, 4 * kMostTextureTaps * texel)).r, 0.5f,
+                0.01f);
+    // No footprint: the texel itself. Turned by 45 degrees it meets as many bright as dark texels.
+    EXPECT_NEAR(sampleTexture(t, dark, Vec2(0), Vec2(0)).r, 0.0f, 1e-5f);
+    EXPECT_NEAR(sampleTexture(t, dark, Vec2(6 * texel), Vec2(texel, -texel) * 0.5f).r, 0.5f, 0.05f);
+}
+
 TEST(CoreTexture, survivesCoordinatesThatAreNotFinite) {
     const Texture t = fourColors();
     const float nan = std::numeric_limits<float>::quiet_NaN();

@@ -125,7 +125,7 @@ TEST(IoGltfFeatures, normalMapsTurnTheShadingNormal) {
         EXPECT_FALSE(scene.textures.at(size_t(material.normal_map.texture)).srgb);
         EXPECT_TRUE(scene.textures.at(size_t(material.base_texture)).srgb);
         const auto normalAt = [&](float u, float v) {
-            return surfaceAt(scene.meshes[0], scene.materials, scene.textures, 0, u, v, 0.0f)
+            return surfaceAt(scene.meshes[0], scene.materials, scene.textures, 0, u, v, {})
                 .normal_object;
         };
         // The left half of the map says +x, the right one +y, which is -v. TEXCOORD_1 reaches to
@@ -145,14 +145,14 @@ TEST(IoGltfFeatures, theBitangentPointsUpInThePicture) {
     // The picture's columns run along x, its rows down along -y: up is +y.
     const Loaded loaded = load(b);
     const Scene& scene = loaded.scene;
-    expectNear(surfaceAt(scene.meshes[0], scene.materials, scene.textures, 0, 0.2f, 0.2f, 0.0f)
+    expectNear(surfaceAt(scene.meshes[0], scene.materials, scene.textures, 0, 0.2f, 0.2f, {})
                    .normal_object,
                Vec3(0, 1, 0), 0.02f);
     // Mirrored uvs: the tangent turns round, up stays.
     b.primitive()["attributes"]["TEXCOORD_1"] = b.addFloats({1, 1, 0, 1, 1, 0}, "VEC2");
     const Loaded mirrored = load(b);
     expectNear(surfaceAt(mirrored.scene.meshes[0], mirrored.scene.materials,
-                         mirrored.scene.textures, 0, 0.2f, 0.2f, 0.0f)
+                         mirrored.scene.textures, 0, 0.2f, 0.2f, {})
                    .normal_object,
                Vec3(0, 1, 0), 0.02f);
 }
@@ -164,7 +164,32 @@ TEST(IoGltfFeatures, specularExtensionScalesWhatIsMirrored) {
                             {"extensions",
                              {{"KHR_materials_specular",
                                {{"specularFactor", 0.5}, {"specularColorFactor", {1, 2, 0}}}}}}}};
-    expectNear(load(b).scene.materials.at(0).specular, Vec3(0.02f, 0.04f, 0.0f));
+    const Loaded loaded = load(b);
+    const SurfaceFinish finish = plainFinish(loaded.scene.materials.at(0));
+    expectNear(finish.specular, Vec3(0.02f, 0.04f, 0.0f));
+    EXPECT_EQ(finish.specular_edge, 0.5f);
+}
+
+TEST(IoGltfFeatures, specularTexturesVaryOverTheSurface) {
+    GltfBuilder b = skinnedTriangle();
+    const std::string png = pngBytes({255, 0, 0, 255, 255, 255, 255, 51});
+    b.json["images"][0]["bufferView"] = b.addView<char>({png.begin(), png.end()});
+    b.json["materials"] = {{{"pbrMetallicRoughness", {{"metallicFactor", 0}}},
+                            {"extensions",
+                             {{"KHR_materials_specular",
+                               {{"specularTexture", {{"index", 0}}},
+                                {"specularColorFactor", {10, 10, 10}},
+                                {"specularColorTexture", {{"index", 0}}}}}}}}};
+    const Loaded loaded = load(b);
+    const auto finishAt = [&](float u) {
+        return surfaceAt(loaded.scene.meshes[0], loaded.scene.materials, loaded.scene.textures, 0,
+                         u, 0, {})
+            .finish;
+    };
+    expectNear(finishAt(0.25f).specular, Vec3(0.4f, 0, 0), 1e-4f);
+    EXPECT_NEAR(finishAt(0.25f).specular_edge, 1.0f, 1e-5f);
+    expectNear(finishAt(0.75f).specular, Vec3(0.08f), 1e-4f);
+    EXPECT_NEAR(finishAt(0.75f).specular_edge, 0.2f, 1e-5f);
 }
 
 TEST(IoGltfFeatures, aMillionInstancesLoadInSeconds) {

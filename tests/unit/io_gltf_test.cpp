@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // glTF files that are right: what is in them arrives in the scene.
+#include <core/image.h>
 #include <gtest/gtest.h>
 
 #include <scenegraph/surface_at.h>
@@ -297,7 +298,7 @@ TEST(IoGltf, placesGpuInstances) {
     EXPECT_NEAR(points.min.z, 100, 1e-5);
 }
 
-TEST(IoGltf, mapsMetallicRoughnessToPhong) {
+TEST(IoGltf, readsTheMaterialsValues) {
     GltfBuilder b = GltfBuilder::triangle();
     b.primitive()["material"] = 0;
     b.json["materials"] = {
@@ -312,10 +313,11 @@ TEST(IoGltf, mapsMetallicRoughnessToPhong) {
            {"metallicFactor", 0.25},
            {"roughnessFactor", 0.5}}}}};
     const Material m = load(b).scene.materials.at(0);
-    const float mirrored = 0.25f * (1.0f - 0.5f * 0.5f);  // metallic, less what is rough
-    EXPECT_NEAR(m.base_color.r, 0.8f * (1.0f - mirrored), 1e-6f);
-    EXPECT_NEAR(m.specular.g, 0.04f * (1.0f - mirrored) + 0.4f * mirrored, 1e-6f);
-    EXPECT_NEAR(m.shininess, 30.0f, 1e-3f);
+    EXPECT_EQ(m.base_color.r, 0.8f);
+    EXPECT_EQ(m.metallic, 0.25f);
+    EXPECT_EQ(m.roughness, 0.5f);
+    EXPECT_EQ(m.specular.g, 0.04f);
+    EXPECT_EQ(m.specular_weight, 1.0f);
     EXPECT_EQ(m.alpha, 0.5f);
     EXPECT_EQ(m.alpha_mode, AlphaMode::kMask);
     EXPECT_EQ(m.alpha_cutoff, 0.25f);
@@ -328,7 +330,7 @@ TEST(IoGltf, mapsMetallicRoughnessToPhong) {
     EXPECT_TRUE(unlit.unlit);
     EXPECT_NEAR(unlit.base_color.r, 0.8f, 1e-6f);
     b.json["materials"][0].erase("extensions");
-    EXPECT_EQ(load(b).scene.materials.at(0).shininess, 1000.0f);
+    EXPECT_EQ(load(b).scene.materials.at(0).roughness, 0.0f);
 }
 
 TEST(IoGltf, loadsBaseTexturesWithTheirSampler) {
@@ -369,27 +371,30 @@ TEST(IoGltf, readsPicturesFromFilesAndBufferViews) {
     EXPECT_EQ(tryLoad(folder.write("t.gltf", b.gltf())).error, "");
 }
 
-TEST(IoGltf, metalnessVariesAndOtherTexturesCountByTheirMean) {
-    GltfBuilder b = texturedTriangle(pngBytes({0, 0, 0, 255, 0, 255, 255, 255}));
+TEST(IoGltf, metalnessRoughnessAndEmissionVaryOverTheSurface) {
+    GltfBuilder b = texturedTriangle(pngBytes({0, 51, 0, 255, 0, 255, 255, 255}));
     b.json["materials"][0]["pbrMetallicRoughness"] = {{"metallicRoughnessTexture", {{"index", 0}}},
                                                       {"roughnessFactor", 0.5}};
-    b.json["materials"][0]["emissiveFactor"] = {1, 1, 1};
+    b.json["materials"][0]["emissiveFactor"] = {1, 0.5, 1};
     b.json["materials"][0]["emissiveTexture"] = {{"index", 0}};
     const Loaded loaded = load(b);
-    const Material& m = loaded.scene.materials[0];
-    EXPECT_EQ(m.base_color.r, 1.0f);
-    const float smooth = 1.0f - 0.25f * 0.25f, mirrored = 0.5f * smooth;  // metallic 1 x 0.5
-    EXPECT_NEAR(m.specular.r, 0.04f * (1.0f - mirrored) + mirrored, 1e-5f);
-    for (const auto& [corner, diffuse] : {std::pair{0.0f, 1.0f}, {1.0f, 1.0f - smooth}}) {
-        const MeshSurface surface =
-            surfaceAt(meshOf(loaded), loaded.scene.materials, loaded.scene.textures, 0,
-                      0.25f + 0.5f * corner, 0, 0);
-        EXPECT_NEAR(surface.albedo.r, diffuse, 1e-5f);
-    }
-    EXPECT_NEAR(m.shininess, 2.0f / (0.25f * 0.25f * 0.25f * 0.25f) - 2.0f,
-                0.5f);  // roughness 0.5 x 0.5
-    EXPECT_NEAR(m.emissive.g, 0.5f, 1e-5f);
-    EXPECT_EQ(m.emissive.r, 0.0f);
+    const auto finishAt = [&](float u, float width) {
+        const LookupBeam beam{width, Vec3(0, 0, -1)};
+        return surfaceAt(meshOf(loaded), loaded.scene.materials, loaded.scene.textures, 0, u, 0,
+                         beam)
+            .finish;
+    };
+    const SurfaceFinish left = finishAt(0.25f, 0.0f), right = finishAt(0.75f, 0.0f);
+    EXPECT_NEAR(left.metallic, 0.0f, 1e-5f);
+    EXPECT_NEAR(left.roughness, 0.1f, 1e-5f);
+    EXPECT_NEAR(left.emissive.g, 0.5f * linearFromSrgb(0.2f), 1e-5f);
+    EXPECT_NEAR(right.metallic, 1.0f, 1e-5f);
+    EXPECT_NEAR(right.roughness, 0.5f, 1e-5f);
+    EXPECT_NEAR(right.emissive.g, 0.5f, 1e-5f);
+    EXPECT_EQ(right.emissive.r, 0.0f);
+    // From afar it is what both texels are together.
+    EXPECT_NEAR(finishAt(0.25f, 10.0f).roughness, 0.3f, 2e-3f);
+    EXPECT_NEAR(finishAt(0.25f, 10.0f).metallic, 0.5f, 2e-3f);
 }
 
 TEST(IoGltf, bakesTextureTransformsIntoUvs) {

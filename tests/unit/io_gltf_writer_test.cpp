@@ -3,6 +3,7 @@
 #include <scenegraph/io/gltf_writer.h>
 #include <scenegraph/io/load.h>
 #include <scenegraph/procedural/generators.h>
+#include <scenegraph/surface_at.h>
 
 #include <core/rng.h>
 #include <render/compare.h>
@@ -59,7 +60,8 @@ TEST_F(IoGltfWriter, treeComesBackAsItWas) {
         const Material& expected = tree.materials[i];
         EXPECT_EQ(scene.materials[i].name, expected.name);
         EXPECT_EQ(scene.materials[i].double_sided, expected.double_sided);
-        EXPECT_NEAR(scene.materials[i].shininess, expected.shininess, 1e-3f * expected.shininess);
+        EXPECT_NEAR(scene.materials[i].roughness, expected.roughness, 1e-6f);
+        EXPECT_NEAR(scene.materials[i].specular.g, expected.specular.g, 1e-6f);
         for (int c = 0; c < 3; ++c)
             EXPECT_NEAR(scene.materials[i].base_color[c], expected.base_color[c], 1e-6f);
     }
@@ -80,7 +82,7 @@ Scene nestedScene() {
         GeneratedMesh made = makePrimitive(kind, 300, Vec3(0.8f, 0.6f, 0.3f));
         for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(scene.materials.size());
         // Rough and with glTF's own reflectance: what the loader takes for a default.
-        made.materials[0].specular = Vec3(0.04f), made.materials[0].shininess = 1.0f;
+        made.materials[0].specular = Vec3(0.04f);
         for (const Vec3& p : made.mesh.positions) made.mesh.uvs.push_back(Vec2(p.x, p.y));
         scene.materials.push_back(made.materials[0]);
         scene.meshes.push_back(std::move(made.mesh));
@@ -255,6 +257,46 @@ void expectValidGlb(const std::string& file) {
         for (const auto& x : material.value("emissiveFactor", std::vector<double>()))
             EXPECT_LE(x, 1.0);
     }
+}
+
+TEST_F(IoGltfWriter, keepsEveryTextureOfAMaterial) {
+    Scene scene = nestedScene();
+    Material& m = scene.materials[1];
+    m.metallic = 0.5f, m.roughness = 0.25f, m.specular = Vec3(0.02f, 0.04f, 0.08f);
+    m.specular_weight = 0.75f, m.normal_scale = 0.5f, m.emissive = Vec3(3, 2, 1);
+    scene.textures.push_back(scene.textures[0]);
+    scene.textures[1].srgb = false;  // as glTF has it for all that is no colour
+    m.normal_map = m.metallic_roughness_map = {1, 0};
+    m.specular_map = {1, 1};
+    m.emissive_map = {0, 0};
+    m.specular_color_map = {0, 1};
+    Mesh& mesh = scene.meshes[1];
+    mesh.more_uvs.push_back(mesh.uvs);
+    for (Vec2& uv : mesh.more_uvs[0]) uv = 3.0f * uv + 0.5f;
+    saveSceneGltf(path("all.glb"), scene);
+    expectValidGlb(path("all.glb"));
+    ThreadPool pool(1);
+    Diagnostics diagnostics;
+    const Scene loaded = loadScene(path("all.glb"), {}, pool, diagnostics);
+    EXPECT_TRUE(diagnostics.warnings.empty());
+    const Mesh* found = nullptr;
+    for (const Mesh& candidate : loaded.meshes) {
+        if (candidate.triangles.size() == mesh.triangles.size()) found = &candidate;
+    }
+    ASSERT_TRUE(found);
+    // Triangles keep their order only up to the build's sorting: compare the sums.
+    const auto sumOf = [](const Scene& from, const Mesh& at) {
+        Vec4 sum(0.0f);
+        for (uint32_t t = 0; t < at.triangles.size(); ++t) {
+            const SurfaceFinish finish =
+                surfaceAt(at, from.materials, from.textures, t, 0.3f, 0.3f, {}).finish;
+            sum += Vec4(finish.roughness, finish.metallic, finish.specular.b + finish.specular_edge,
+                        finish.emissive.g);
+        }
+        return sum;
+    };
+    const Vec4 expected = sumOf(scene, mesh), sums = sumOf(loaded, *found);
+    for (int c = 0; c < 4; ++c) EXPECT_NEAR(sums[c], expected[c], 1e-3f * expected[c]) << c;
 }
 
 TEST_F(IoGltfWriter, filesKeepToTheRulesOfGltf) {

@@ -74,7 +74,10 @@ TEST(IoJson, schemaProblemsNameTheInnermostPlace) {
 
     problem = schema.firstProblem(Json::parse(R"({"lists": []})"));
     ASSERT_TRUE(problem);
-    EXPECT_EQ(problem->message, "unknown key \"lists\"");
+    EXPECT_EQ(problem->message, "unknown key \"lists\"; did you mean \"list\"?");
+    problem = schema.firstProblem(Json::parse(R"({"colour": []})"));
+    ASSERT_TRUE(problem);
+    EXPECT_EQ(problem->message, "unknown key \"colour\"");
 }
 
 }  // namespace

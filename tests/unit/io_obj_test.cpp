@@ -44,7 +44,8 @@ TEST(IoObj, readsMaterialsTexturesAndOpacities) {
     EXPECT_EQ(materials[1].alpha_mode, AlphaMode::kBlend);
     EXPECT_EQ(materials[1].alpha, 0.25f);
     EXPECT_NEAR(materials[1].base_color.r, 0.2140f, 1e-3f);  // 0.5 in sRGB
-    EXPECT_NEAR(materials[1].specular.r, 0.2f, 1e-5f);
+    EXPECT_NEAR(materials[1].specular.r, 0.8f, 1e-5f);
+    EXPECT_NEAR(materials[1].roughness, std::pow(0.2f, 0.25f), 1e-5f);
     EXPECT_EQ(materials[1].base_texture, kNoTexture);
     EXPECT_EQ(materials[2].alpha_mode, AlphaMode::kBlend);
     const Texture& leaf = loaded.scene.textures.at(size_t(materials[2].base_texture));

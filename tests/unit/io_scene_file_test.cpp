@@ -199,6 +199,49 @@ TEST(IoSceneFile, readsCamerasLightsBackgroundAndRenderDefaults) {
     EXPECT_TRUE(loadChecked(s).scene.lighting.suns.empty());
 }
 
+TEST(IoSceneFile, scalesModelsFromFiles) {
+    const TempFolder folder;
+    folder.write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n");
+    const std::string scene = folder.write("s.scene.json", R"({"version": 1,
+        "assets": {"cm": {"file": "t.obj", "scale": 0.01}, "m": {"file": "t.obj"}},
+        "groups": {"all": {"instances": [{"child": "cm", "translation": [5, 0, 0]}],
+                           "scatter": {"on": "cm", "items": [{"child": "m"}], "count": 3,
+                                       "max_slope": 180}}},
+        "root": "all"})");
+    const Loaded loaded = tryLoad(scene);
+    ASSERT_EQ(loaded.error, "");
+    EXPECT_EQ(loaded.scene.meshes.size(), 1u);  // the file is kept once
+    EXPECT_EQ(meshInstances(loaded.scene), std::vector<double>{4.0});
+    const DBox3 bounds = sceneBounds(loaded.scene);
+    EXPECT_NEAR(bounds.max.x, 5.01, 1e-6);
+    for (size_t i = 0; i < rootOf(loaded).instances.size(); ++i) {
+        const DVec3 at = rootOf(loaded).instances.groupFromChild(i).translation;
+        EXPECT_TRUE(std::abs(at.x - 5.0) < 1e-6 || (at.x <= 0.01 && at.y <= 0.02)) << at.x;
+    }
+}
+
+TEST(IoSceneFile, aScatterRuleWithoutAnyPlaceIsOneWarning) {
+    Json s = minimal();
+    s["assets"]["ground"] = {{"generate", "terrain"}, {"resolution", 9}, {"size", 50}};
+    s["groups"]["all"]["scatter"] = {
+        {"on", "ground"}, {"count", 200}, {"min_height", 9000}, {"items", {{{"child", "ball"}}}}};
+    const Loaded loaded = loadChecked(s);
+    EXPECT_EQ(rootOf(loaded).instances.size(), 1u);
+    ASSERT_EQ(loaded.diagnostics.warnings.size(), 1u);
+    EXPECT_TRUE(loaded.diagnostics.warnings[0].ends_with(
+        "s.scene.json: /groups/all/scatter: nothing found a place"));
+}
+
+TEST(IoSceneFile, countsHowOftenEachMeshIsShown) {
+    Json s = minimal();
+    s["assets"]["unused"] = {{"generate", "box"}};
+    s["groups"]["row"] = {{"grid", {{"child", "all"}, {"count_x", 5}, {"count_z", 4}}},
+                          {"instances", {{{"child", "ball"}}}}};
+    s["root"] = "row";
+    const Loaded loaded = loadChecked(s);
+    EXPECT_EQ(meshInstances(loaded.scene), (std::vector<double>{21.0, 0.0}));
+}
+
 // One change that makes the scene wrong, as a JSON merge patch, and how the error begins and what
 // it says.
 struct Wrong {
@@ -223,6 +266,11 @@ TEST(IoSceneFile, namesWhatIsWrongByJsonPointer) {
         {R"({"assets": {"a": {}}})", "/assets/a", "'file'"},
         {R"({"assets": {"a": {"file": "x.glb", "height": 2}}})", "/assets/a",
          "unknown key \"height\""},
+        {R"({"assets": {"a": {"file": "x.glb", "scal": 2}}})", "/assets/a",
+         "unknown key \"scal\"; did you mean \"scale\"?"},
+        {R"({"assets": {"a": {"generate": "rock", "raduis": 2}}})", "/assets/a",
+         "unknown key \"raduis\"; did you mean \"radius\"?"},
+        {R"({"assets": {"a": {"file": "x.glb", "scale": 0}}})", "/assets/a/scale", "got 0"},
         {R"({"assets": {"a/b": {"generate": "rock", "radius": 0}}})", "/assets/a~1b/radius",
          "got 0"},
         {R"({"assets": {"a": {"file": "x.obj"}}})", "/assets/a/file", "cannot be opened"},
@@ -272,7 +320,8 @@ TEST(IoSceneFile, namesWhatIsWrongByJsonPointer) {
         {R"({"cameras": [{"name": "a", "eye": [0, 0, 0], "target": [0, 0, 1]}, {"name": "a", "eye": [0, 0, 0], "target": [0, 0, 1]}]})",
          "/cameras/1", "name \"a\" too"},
         {R"({"lights": {"suns": [{"direction": [0, 0, 0]}]}})", "/lights/suns/0/direction", "zero"},
-        {R"({"background": {"zenit": [0, 0, 0]}})", "/background", "unknown key \"zenit\""},
+        {R"({"background": {"zenit": [0, 0, 0]}})", "/background",
+         "unknown key \"zenit\"; did you mean \"zenith\"?"},
         {R"({"render": {"sampels": 2}})", "/render/sampels", "samples"},
         {R"({"render": {"samples": "many"}})", "/render/samples", ""},
         {R"({"render": {"samples": [2]}})", "/render/samples", "wrong type"},
