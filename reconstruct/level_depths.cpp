@@ -32,6 +32,12 @@ LevelDepths::LevelDepths(const View& view, int highest, PullPushCoverage coverag
     level_of_width_[kNoPatch] = 0;
 }
 
+std::array<uint8_t, kWidthCodes> LevelDepths::hasLevel() const {
+    std::array<uint8_t, kWidthCodes> has{};
+    for (size_t code = 0; code < has.size(); ++code) has[code] = level_of_width_[code] > 0;
+    return has;
+}
+
 void LevelDepths::reset(const SubpixelRect& rect) {
     for (int l = 1; l <= highest_; ++l) {
         Level& level = levels_[size_t(l - 1)];
@@ -77,6 +83,18 @@ void LevelDepths::finish(const DepthTile& hits, double k) {
                 surface[level.index(x, y)] = surfaceAt(level, x, y);
         }
         level.native.swap(surface);
+        level.around.assign(level.native.size(), 0.0f);
+        for (int y = level.y0; y < level.y0 + level.height; ++y) {
+            for (int x = level.x0; x < level.x0 + level.width; ++x) {
+                float& around = level.around[level.index(x, y)];
+                for (int ny = std::max(y - 1, level.y0);
+                     ny < std::min(y + 2, level.y0 + level.height); ++ny) {
+                    for (int nx = std::max(x - 1, level.x0);
+                         nx < std::min(x + 2, level.x0 + level.width); ++nx)
+                        around = std::max(around, level.native[level.index(nx, ny)]);
+                }
+            }
+        }
         level.solidity.assign(level.native.size(), 0.0f);
         for (int cy = level.y0; cy < level.y0 + level.height; ++cy) {
             for (int cx = level.x0; cx < level.x0 + level.width; ++cx) {
@@ -108,13 +126,7 @@ float LevelDepths::corner(int l, int x, int y, float depth) const {
     const size_t i = level.index(x, y);
     const auto isInFront = [&](float cell) { return cell + behind(cell, l) < depth; };
     if (!isInFront(level.native[i])) return 0.0f;
-    for (int ny = std::max(y - 1, level.y0); ny < std::min(y + 2, level.y0 + level.height); ++ny) {
-        for (int nx = std::max(x - 1, level.x0); nx < std::min(x + 2, level.x0 + level.width);
-             ++nx) {
-            if (!isInFront(level.native[level.index(nx, ny)])) return level.solidity[i];
-        }
-    }
-    return 1.0f;
+    return isInFront(level.around[i]) ? 1.0f : level.solidity[i];
 }
 
 float LevelDepths::coverage(int x, int y, float depth) const {

@@ -30,6 +30,9 @@ public:
     // hide nothing beside them.
     int levelOf(uint8_t width_code) const { return level_of_width_[width_code]; }
 
+    // 1 where levelOf() is above 0.
+    std::array<uint8_t, kWidthCodes> hasLevel() const;
+
     // Empty; cells lie on multiples of their width in the picture, and are wholly there: `rect` is
     // widened to them.
     void reset(const SubpixelRect& rect);
@@ -58,6 +61,7 @@ private:
         int x0 = 0, y0 = 0, width = 0, height = 0;  // in cells
         // Nearest depth of points of this level, and of points of finer ones.
         std::vector<float> native, finer;
+        std::vector<float> around;    // farthest depth of a cell and its neighbours
         std::vector<float> solidity;  // [0, 1], of a cell at a silhouette
         std::vector<float> farthest;  // of 4 x 4 cells of `native`
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/pull_push.h>
 
-#include <reconstruct/depth_pass.h>
 #include <reconstruct/level_depths.h>
 #include <reconstruct/pixel_filter.h>
 #include <reconstruct/pull_push_fill.h>
+#include <reconstruct/split_pass.h>
 #include <reconstruct/surface_channels.h>
 
 namespace stipple {
@@ -15,24 +15,22 @@ class PullPush : public TileReconstruction {
 public:
     explicit PullPush(const ReconstructionContext& context)
         : context_(context),
-          patch_pass_(context_, 0),
-          hit_pass_(context_, 1),
           levels_(context.view, levelOfDensity(context.settings.samples),
                   context.settings.pull_push_coverage, context.settings.pull_push_threshold),
+          split_(context_, levels_.hasLevel()),
           filter_(context.view.subpixels, 0.0f) {}
 
     int passCount() const override { return 1; }
     // What pull and push carry, and cells around it that say what is covered.
     int halo() const override {
-        return std::max(patch_pass_.reach(false), (3 + 4) << levels_.highest());
+        return std::max(split_.reach(false), (3 + 4) << levels_.highest());
     }
 
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
         inner_ = inner;
         hits_.reset(outer, context_.base, kZBufferBit);
         levels_.reset(outer);
-        patch_pass_.begin(inner);
-        hit_pass_.begin(inner);
+        split_.begin(inner);
         points_since_refresh_ = 0;
         shader_.forget();
         channels_.forget();
@@ -43,29 +41,17 @@ public:
         if (!context_.settings.culling) return false;
         if (levels_.highest() > 0 && levels_.hides(rect, z_min)) return true;
         // What covers no more than its subpixel; else what its cells cover, too.
-        const int reach = narrow ? 0 : patch_pass_.reach(false) + (4 << levels_.highest());
+        const int reach = narrow ? 0 : split_.reach(false) + (4 << levels_.highest());
         return hits_.hides({rect.x0 - reach, rect.y0 - reach, rect.x1 + reach, rect.y1 + reach},
                            z_min);
     }
     const SubpixelRect& region() const override { return hits_.rect(); }
 
-    // Points with a level above 0 hit one subpixel; others cover what their patch asks for.
     bool take(const PointBlock& block) override {
-        int with_level = 0;
-        for (int i = 0; i < block.count; ++i) with_level += levels_.levelOf(block.width[i]) > 0;
-        if (with_level == 0) return patch_pass_.take(block, hits_);
-        enterLevels(block);
-        if (with_level == block.count) return hit_pass_.take(block, hits_);
-        for (const bool is_level : {false, true}) {
-            mixed_ = block;
-            for (int i = 0; i < block.count; ++i)
-                mixed_.keep[i] &= (levels_.levelOf(block.width[i]) > 0) == is_level;
-            is_level ? hit_pass_.take(mixed_, hits_) : patch_pass_.take(mixed_, hits_);
-        }
-        twice_drawn_ += uint64_t(block.count);
+        if (split_.take(block, hits_) > 0) enterLevels(block);
         return true;
     }
-    bool take(const TriangleBlock& block) override { return patch_pass_.take(block, hits_); }
+    bool take(const TriangleBlock& block) override { return split_.take(block, hits_); }
 
     void endTile(const SampleLookup& lookup) override {
         levels_.finish(hits_, context_.settings.samples);
@@ -82,17 +68,11 @@ public:
         }
         filter_.apply(shaded_, inner_, [&](int x, int y, PixelSums& sums) {
             channels_.add(lookup, hits_, x, y, sums);
-            patch_pass_.addCount(x, y, sums);
-            hit_pass_.addCount(x, y, sums);
+            split_.addCount(x, y, sums);
             context_.picture->write(x, y, sums);
         });
     }
-    TileCounters counters() const override {
-        TileCounters sum = patch_pass_.counters();
-        sum.points_drawn += hit_pass_.counters().points_drawn - twice_drawn_;
-        sum.points_kept += hit_pass_.counters().points_kept;
-        return sum;
-    }
+    TileCounters counters() const override { return split_.counters(); }
 
 private:
     static constexpr int kChannels = 5;  // radiance, coverage, depth
@@ -155,8 +135,8 @@ private:
     }
 
     const ReconstructionContext context_;
-    DepthPass patch_pass_, hit_pass_;
     LevelDepths levels_;
+    SplitPass split_;
     PixelFilter filter_;
     SubpixelShader shader_{context_};
     SurfaceChannels channels_{context_};
@@ -164,9 +144,7 @@ private:
     DepthTile hits_;
     WeightedImage weighted_;
     ShadedTile shaded_;
-    PointBlock mixed_;
     int points_since_refresh_ = 0;
-    uint64_t twice_drawn_ = 0;
 };
 
 }  // namespace

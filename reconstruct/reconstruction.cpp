@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/reconstruction.h>
 
+#include <reconstruct/ewa.h>
 #include <reconstruct/gaussian.h>
 #include <reconstruct/per_pixel.h>
 #include <reconstruct/pull_push.h>
@@ -47,6 +48,7 @@ std::unique_ptr<TileReconstruction> makeReconstruction(const ReconstructionConte
         case Reconstruct::kPullPush:
             return makePullPush(context);
         case Reconstruct::kEwa:
+            return makeEwa(context);
         case Reconstruct::kPerPixel:
             break;
     }

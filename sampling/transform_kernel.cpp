@@ -87,4 +87,23 @@ __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) vo
     }
 }
 
+void makeSurfels(const SurfelParams& params, const ListBlock& list, int first_lane, int count,
+                 int lane, PointBlock& out) {
+    const float f2 = params.focal * params.focal * params.density;
+    for (int i = 0; i < count; ++i) {
+        const int from = first_lane + i, to = lane + i;
+        Vec3 n = params.camera_from_normal * Vec3(float(list.normal[0][from]),
+                                                  float(list.normal[1][from]),
+                                                  float(list.normal[2][from]));
+        n /= std::max(glm::length(n), 1e-30f);
+        const Vec3 p(out.x[to], out.y[to], out.z[to]);
+        // The projection factor; nothing is seen edge-on.
+        const float factor = params.orthographic
+                                 ? f2 * std::abs(n.z)
+                                 : f2 * std::abs(glm::dot(n, p)) / (p.z * p.z * p.z);
+        out.normal_x[to] = n.x, out.normal_y[to] = n.y, out.normal_z[to] = n.z;
+        out.area[to] = 1.0f / std::max(factor, 1e-30f);
+    }
+}
+
 }  // namespace stipple
