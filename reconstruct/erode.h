@@ -12,10 +12,11 @@
 
 namespace stipple {
 
-// reach: subpixels beyond its own that a splat at a depth covers on each side. Where a triangle is
-// shown nothing changes: triangles are exact. Takes time proportional to subpixels x reach; the
-// outermost subpixels of the tile, as many as the reach, are wrong.
-void erodeSplats(DepthTile& tile, const std::function<int(float depth)>& reach,
-                 std::vector<uint64_t>& scratch);
+// eroded: becomes the tile's keys after erosion, laid out as the tile's. reach: subpixels beyond
+// its own that a splat at a depth covers on each side. Where a triangle is shown nothing changes:
+// triangles are exact. Takes time proportional to subpixels x reach; the outermost subpixels of the
+// tile, as many as the reach, are wrong.
+void erodeSplats(const DepthTile& tile, const std::function<int(float depth)>& reach,
+                 std::vector<uint64_t>& eroded);
 
 }  // namespace stipple

@@ -3,6 +3,7 @@
 
 #include <reconstruct/ellipse.h>
 #include <reconstruct/front_slack.h>
+#include <reconstruct/per_pixel.h>
 #include <reconstruct/pixel_filter.h>
 #include <reconstruct/split_pass.h>
 #include <reconstruct/surface_channels.h>
@@ -13,7 +14,7 @@ namespace {
 
 constexpr float kPi = 3.14159265f;
 // Discs of the visibility pass have this many times the area that a point stands for.
-constexpr float kDiscArea = 4.0f;
+constexpr float kDiscArea = 6.0f;
 // And at least this radius in the picture, so that they reach a subpixel's centre.
 constexpr float kLeastRadius = 0.71f;
 // Standard deviation of a splat, over the square root of the area that a point stands for.
@@ -31,21 +32,14 @@ struct Gathered {
 float discRadius(double k) { return std::sqrt(kDiscArea / (kPi * float(k))); }
 
 std::array<uint8_t, kWidthCodes> wideCodes(double k) {
-    std::array<uint8_t, kWidthCodes> wide{};
-    const float least = kWideInDiscs * std::max(2.0f * discRadius(k), 2.0f);
-    for (int code = 1; code < kWidthCodes; ++code) {
-        const float width =
-            std::exp2(float(code) / float(kWidthsPerOctave) + float(kFirstSubpixelExponent));
-        wide[size_t(code)] = width >= least;
-    }
-    return wide;
+    return codesFromWidth(kWideInDiscs * std::max(2.0f * discRadius(k), 2.0f));
 }
 
 class Ewa : public TileReconstruction {
 public:
     explicit Ewa(const ReconstructionContext& context)
         : context_(context),
-          split_(context_, wideCodes(context.settings.samples)),
+          split_(context_, wideCodes(context.settings.samples), 1),
           filter_(context.view.subpixels, 0.0f),
           slack_(context.view),
           prefilter_(float(context.settings.ewa_prefilter * context.settings.ewa_prefilter)) {
@@ -59,7 +53,8 @@ public:
 
     int passCount() const override { return 2; }
     int halo() const override {
-        return std::max(std::max(disc_reach_, split_.reach(false)) + rim_, splat_reach_);
+        // Filling looks two subpixels around.
+        return std::max(std::max(disc_reach_, split_.reach(false)) + rim_ + 2, splat_reach_);
     }
 
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
@@ -79,6 +74,7 @@ public:
         if (pass == 0) return;
         for (size_t i = 0; i < front_.keys().size(); ++i)
             front_.keys()[i] = std::min(front_.keys()[i], hits_.keys()[i]);
+        if (context_.settings.fill) fillHoles(front_, scratch_);
         front_.refreshHidden();
     }
 
@@ -103,7 +99,7 @@ public:
             }
             return false;
         }
-        if (split_.take(block, hits_) > 0) {
+        if (split_.take(block, hits_, hits_) > 0) {
             for (int i = 0; i < block.count; ++i) {
                 if (block.keep[i] && split_.isWide(block.width[i])) drawDisc(block, i);
             }
@@ -263,6 +259,7 @@ private:
     SubpixelRect inner_;
     DepthTile hits_;   // the nearest point of each subpixel; at the end what it shows
     DepthTile front_;  // the nearest disc
+    std::vector<uint64_t> scratch_;
     std::vector<Gathered> gathered_;
     ShadedTile shaded_;
     int discs_since_refresh_ = 0;

@@ -1,33 +1,46 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/gaussian.h>
 
-#include <reconstruct/depth_pass.h>
+#include <reconstruct/erode.h>
 #include <reconstruct/front_slack.h>
 #include <reconstruct/per_pixel.h>
 #include <reconstruct/pixel_filter.h>
+#include <reconstruct/split_pass.h>
 #include <reconstruct/surface_channels.h>
 
 namespace stipple {
 
 namespace {
 
+// Side of the squares that close large surfaces of k points a subpixel: odd, so that erosion takes
+// back exactly what they add; six points in each, so that hardly any hole is left.
+int closingSide(double k) {
+    constexpr int kMost = 15;
+    int side = 3;
+    while (side < kMost && double(side) * double(side) * k < 6.0) side += 2;
+    return side;
+}
+
 class Gaussian : public TileReconstruction {
 public:
     explicit Gaussian(const ReconstructionContext& context)
         : context_(context),
-          depth_pass_(context_, 0),
+          side_(closingSide(context.settings.samples)),
+          split_(context_, codesFromWidth(kWideInSides * float(side_)), side_),
           filter_(context.view.subpixels, float(context.settings.splat_size) *
                                               float(context.view.subpixels) / std::sqrt(12.0f)),
           slack_(context.view) {}
 
     int passCount() const override { return 2; }
-    // Filling looks two subpixels around, at what points a reach further cover.
-    int halo() const override { return filter_.margin() + 2 + depth_pass_.reach(false); }
+    // Filling looks two subpixels around, erosion as far as points reach, at what points reach from
+    // further away.
+    int halo() const override { return filter_.margin() + 2 + 2 * split_.reach(false); }
 
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
         inner_ = inner;
         tile_.reset(outer, context_.base, kZBufferBit);
-        depth_pass_.begin(inner);
+        surfaces_.reset(outer, context_.base, kZBufferBit);
+        split_.begin(inner);
         const int margin = filter_.margin();
         shaded_.reset({std::max(outer.x0, inner.x0 - margin), std::max(outer.y0, inner.y0 - margin),
                        std::min(outer.x1, inner.x1 + margin),
@@ -40,6 +53,7 @@ public:
         pass_ = pass;
         lookup_ = &lookup;
         if (pass == 0) return;
+        closeSurfaces();
         if (context_.settings.fill) fillHoles(tile_, scratch_);
         tile_.refreshHidden();
     }
@@ -47,32 +61,57 @@ public:
     bool hides(const SubpixelRect& rect, float z_min, bool narrow) override {
         if (!context_.settings.culling) return false;
         if (pass_ == 1) return tile_.hides(rect, slack_.frontOf(z_min));
-        const int reach = depth_pass_.reach(narrow);
-        return tile_.hides({rect.x0 - reach, rect.y0 - reach, rect.x1 + reach, rect.y1 + reach},
-                           z_min);
+        const auto grown = [&](int by) {
+            return SubpixelRect{rect.x0 - by, rect.y0 - by, rect.x1 + by, rect.y1 + by};
+        };
+        const int reach = split_.reach(narrow);
+        // Erosion shows nothing farther than what is there within the reach of a square.
+        return tile_.hides(grown(reach), z_min) || surfaces_.hides(grown(reach + side_ / 2), z_min);
     }
     const SubpixelRect& region() const override { return pass_ == 0 ? tile_.rect() : shaded_.rect; }
 
     bool take(const PointBlock& block) override {
-        if (pass_ == 0) return depth_pass_.take(block, tile_);
+        if (pass_ == 0) {
+            split_.take(block, tile_, surfaces_);
+            return true;
+        }
         average(block);
         return false;
     }
     bool take(const TriangleBlock& block) override {
-        return pass_ == 0 && depth_pass_.take(block, tile_);
+        return pass_ == 0 && split_.take(block, tile_);
     }
 
     void endTile(const SampleLookup& lookup) override {
         showFronts(lookup);
         filter_.apply(shaded_, inner_, [&](int x, int y, PixelSums& sums) {
             channels_.add(lookup, tile_, x, y, sums);
-            depth_pass_.addCount(x, y, sums);
+            split_.addCount(x, y, sums);
             context_.picture->write(x, y, sums);
         });
     }
-    TileCounters counters() const override { return depth_pass_.counters(); }
+    TileCounters counters() const override { return split_.counters(); }
 
 private:
+    // A patch at least this many squares wide is a surface.
+    static constexpr float kWideInSides = 4.0f;
+
+    // Large surfaces, eroded, into tile_.
+    void closeSurfaces() {
+        erodeSplats(
+            surfaces_, [&](float) { return side_ / 2; }, scratch_);
+        for (size_t i = 0; i < scratch_.size(); ++i) {
+            uint64_t& key = tile_.keys()[i];
+            const uint64_t near_key = surfaces_.keys()[i], far_key = scratch_[i];
+            // Points all around: a surface goes on here, and must not sink below a triangle close
+            // behind it for the depth that it gains within a square.
+            const bool is_within =
+                far_key != DepthTile::kEmpty && !(DepthTile::numberOf(far_key) & kKindBits) &&
+                DepthTile::numberOf(key) != kNoNumber && DepthTile::numberOf(key) & kKindBits;
+            key = std::min(key, is_within ? near_key : far_key);
+        }
+    }
+
     // Sums of the points on each subpixel's front; `covered` counts them.
     void average(const PointBlock& block) {
         const View& view = context_.view;
@@ -118,13 +157,15 @@ private:
     }
 
     const ReconstructionContext context_;
-    DepthPass depth_pass_;
+    const int side_;  // of the squares that close large surfaces
+    SplitPass split_;
     PixelFilter filter_;
     const FrontSlack slack_;
     SubpixelShader shader_{context_};
     SurfaceChannels channels_{context_};
     SubpixelRect inner_;
-    DepthTile tile_;
+    DepthTile tile_;      // what each subpixel shows; before the second pass, without surfaces
+    DepthTile surfaces_;  // large surfaces, closed
     ShadedTile shaded_;
     std::vector<uint64_t> scratch_;
     int pass_ = 0;

@@ -7,7 +7,7 @@
 // on is wide, so depth decides what belongs together. A Gaussian over the subpixels then makes the
 // pixels. So a place counts by the area that is seen of it: were points weighed one by one, dense
 // foliage, whose leaves lie behind each other, would outweigh the bright ground in its gaps.
-// Where points suffice, the tile is drawn at more subpixels than asked for, with the same points
+// Where points suffice, the tile is drawn at more subpixels than asked for, with as many points
 // (drawnSettings() in reconstruction.h): what a pixel shows of an edge then follows from where its
 // points lie.
 #pragma once

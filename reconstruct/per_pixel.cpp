@@ -86,6 +86,7 @@ public:
         if (is_splat_) {
             const auto reach = [&](float depth) { return (depth_pass_.sideAt(depth) - 1) / 2; };
             erodeSplats(tile_, reach, scratch_);
+            tile_.keys().swap(scratch_);
         }
         if (context_.settings.fill) fillHoles(tile_, scratch_);
         const int s = context_.view.subpixels;

@@ -17,7 +17,7 @@ public:
         : context_(context),
           levels_(context.view, levelOfDensity(context.settings.samples),
                   context.settings.pull_push_coverage, context.settings.pull_push_threshold),
-          split_(context_, levels_.hasLevel()),
+          split_(context_, levels_.hasLevel(), 1),
           filter_(context.view.subpixels, 0.0f) {}
 
     int passCount() const override { return 1; }
@@ -48,7 +48,7 @@ public:
     const SubpixelRect& region() const override { return hits_.rect(); }
 
     bool take(const PointBlock& block) override {
-        if (split_.take(block, hits_) > 0) enterLevels(block);
+        if (split_.take(block, hits_, hits_) > 0) enterLevels(block);
         return true;
     }
     bool take(const TriangleBlock& block) override { return split_.take(block, hits_); }

@@ -22,9 +22,6 @@ RenderSettings drawnSettings(const RenderSettings& settings) {
     const double area = double(split) * double(split);
     drawn.subpixels *= split;
     drawn.samples /= area;
-    // The same triangles become points.
-    drawn.area_threshold *= area;
-    drawn.large_triangle *= area;
     return drawn;
 }
 

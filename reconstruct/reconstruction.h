@@ -54,7 +54,7 @@ public:
 };
 
 // The settings with which a frame is drawn for settings.reconstruct. Reconstructions that use all
-// points, not only the nearest of a subpixel, draw more and smaller subpixels with the same points
+// points, not only the nearest of a subpixel, draw more and smaller subpixels with as many points
 // as long as at least about one point falls into each: at 1 x 1 subpixels of 4 points, 2 x 2 of
 // one. Never above 4 x 4, where edges have gradations enough.
 RenderSettings drawnSettings(const RenderSettings& settings);

@@ -67,7 +67,7 @@ void PointWriter::add(const InstanceFrame& frame, ChildRef child, uint32_t node,
             context_.lists.points(child, node, first, int(n), run.list_length, scratch_, lane);
         transformPoints(params, list, lane, first, int(n), context_.nextNumber(), block_.count,
                         block_);
-        if (context_.sink->wantsSurfels()) {
+        if (!density.narrow && context_.sink->wantsSurfels()) {
             const View& view = context_.view;
             makeSurfels({frame.camera_from_normal, float(view.focal), float(density.wanted),
                          view.orthographic},

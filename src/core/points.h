@@ -74,7 +74,7 @@ struct PointBlock {
     alignas(64) uint8_t keep[kBlockPoints + kBlockPadding];     // 1: kept by thinning, 0: not there
     alignas(64) uint8_t width[kBlockPoints + kBlockPadding];    // patchWidthCode(), in subpixels
     // Only for sinks that want surfels: geometric normal (unit, camera space, either side) and the
-    // area that a kept point stands for, m^2.
+    // area that a kept point stands for, m^2. Not filled where the width is kNoPatch.
     alignas(64) float normal_x[kBlockPoints + kBlockPadding];
     alignas(64) float normal_y[kBlockPoints + kBlockPadding];
     alignas(64) float normal_z[kBlockPoints + kBlockPadding];
