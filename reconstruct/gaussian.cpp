@@ -32,9 +32,9 @@ public:
           slack_(context.view) {}
 
     int passCount() const override { return 2; }
-    // Filling looks two subpixels around, erosion as far as points reach, at what points reach from
-    // further away.
-    int halo() const override { return filter_.margin() + 2 + 2 * split_.reach(false); }
+    // Filling looks two subpixels around, twice, and erosion as far as points reach, at what points
+    // reach from further away.
+    int halo() const override { return filter_.margin() + 4 + 2 * split_.reach(false); }
 
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
         inner_ = inner;
@@ -98,6 +98,14 @@ private:
 
     // Large surfaces, eroded, into tile_.
     void closeSurfaces() {
+        // A surface may go on in triangles.
+        for (size_t i = 0; i < tile_.keys().size(); ++i) {
+            const uint64_t key = tile_.keys()[i];
+            if (DepthTile::numberOf(key) != kNoNumber && DepthTile::numberOf(key) & kKindBits)
+                surfaces_.keys()[i] = std::min(surfaces_.keys()[i], key);
+        }
+        // What is left open is a subpixel or two, erosion would make a square of it.
+        if (context_.settings.fill) fillHoles(surfaces_, scratch_);
         erodeSplats(
             surfaces_, [&](float) { return side_ / 2; }, scratch_);
         for (size_t i = 0; i < scratch_.size(); ++i) {

@@ -12,6 +12,8 @@ namespace {
 // through the bilinear mesh and one more by making its neighbours' cells interior ones.
 constexpr int kReachCells = 4;
 constexpr int kBlock = 4;
+// Neighbouring cells of one surface differ by no more than this many of their widths in depth.
+constexpr float kSlope = 6.0f;
 
 }  // namespace
 
@@ -23,7 +25,8 @@ LevelDepths::LevelDepths(const View& view, int highest, PullPushCoverage coverag
     : orthographic_(view.orthographic),
       is_bilinear_(coverage == PullPushCoverage::kBilinear),
       highest_(highest),
-      threshold_(threshold ? 3.0f / float(view.focal) : 0.0f),
+      per_subpixel_(1.0f / float(view.focal)),
+      threshold_(threshold ? 3.0f * per_subpixel_ : 0.0f),
       levels_(size_t(highest)) {
     for (int code = 0; code < kWidthCodes; ++code) {
         const int log_width = code / kWidthsPerOctave + kFirstSubpixelExponent;
@@ -54,18 +57,21 @@ void LevelDepths::reset(const SubpixelRect& rect) {
     }
 }
 
-// Where a surface passes from a level to a finer one, the meshes of both end at their last cells'
-// centres, and neither covers what lies between: the coarse mesh goes on over one more cell, where
-// finer points continue the surface.
-float LevelDepths::surfaceAt(const Level& level, int x, int y) const {
+// Where a surface passes from a level to a finer one, or to triangles, the meshes of both end at
+// their last cells' centres, and neither covers what lies between: the coarse mesh goes on over one
+// more cell, where finer points or triangles continue the surface.
+float LevelDepths::surfaceAt(int l, int x, int y) const {
+    const Level& level = levels_[size_t(l - 1)];
     const size_t i = level.index(x, y);
-    float depth = level.native[i];
-    if (!(level.finer[i] < depth)) return depth;
+    const float depth = level.native[i], finer = level.finer[i];
+    if (!(finer < depth)) return depth;
+    const float step = kSlope * float(1 << l) * (orthographic_ ? 1.0f : finer);
     for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
             const int nx = std::clamp(x + dx, level.x0, level.x0 + level.width - 1),
                       ny = std::clamp(y + dy, level.y0, level.y0 + level.height - 1);
-            if (level.native[level.index(nx, ny)] < kInfinity) return level.finer[i];
+            if (std::abs(level.native[level.index(nx, ny)] - finer) <= step * per_subpixel_)
+                return finer;
         }
     }
     return depth;
@@ -73,6 +79,16 @@ float LevelDepths::surfaceAt(const Level& level, int x, int y) const {
 
 void LevelDepths::finish(const DepthTile& hits, double k) {
     const SubpixelRect& rect = hits.rect();
+    if (highest_ > 0) {
+        for (int y = rect.y0; y < rect.y1; ++y) {
+            const uint64_t* row = hits.row(y);
+            for (int x = rect.x0; x < rect.x1; ++x) {
+                const uint32_t number = DepthTile::numberOf(row[x]);
+                if (number != kNoNumber && number & kKindBits)
+                    add(0, x, y, DepthTile::depthOf(row[x]));
+            }
+        }
+    }
     // Share of the subpixels of a surface that are hit.
     const float hit_share = float(-std::expm1(-k));
     for (int l = 1; l <= highest_; ++l) {
@@ -80,7 +96,7 @@ void LevelDepths::finish(const DepthTile& hits, double k) {
         std::vector<float> surface(level.native.size());
         for (int y = level.y0; y < level.y0 + level.height; ++y) {
             for (int x = level.x0; x < level.x0 + level.width; ++x)
-                surface[level.index(x, y)] = surfaceAt(level, x, y);
+                surface[level.index(x, y)] = surfaceAt(l, x, y);
         }
         level.native.swap(surface);
         level.around.assign(level.native.size(), 0.0f);
@@ -91,7 +107,8 @@ void LevelDepths::finish(const DepthTile& hits, double k) {
                      ny < std::min(y + 2, level.y0 + level.height); ++ny) {
                     for (int nx = std::max(x - 1, level.x0);
                          nx < std::min(x + 2, level.x0 + level.width); ++nx)
-                        around = std::max(around, level.native[level.index(nx, ny)]);
+                        around = std::max(around, std::min(level.native[level.index(nx, ny)],
+                                                           level.finer[level.index(nx, ny)]));
                 }
             }
         }
@@ -109,10 +126,10 @@ void LevelDepths::finish(const DepthTile& hits, double k) {
                     const uint64_t* row = hits.row(y);
                     for (int x = x0; x < x1; ++x) hit += DepthTile::depthOf(row[x]) <= limit;
                 }
-                // Half a cell of surface makes a corner of the mesh, so that the mesh ends half a
-                // cell within the surface's edge and its coverage falls to nothing beyond it.
+                // Three eighths of a cell make a corner of the mesh, an eighth or less none: the
+                // mesh ends near the surface's edge on average.
                 const float share = float(hit) / (hit_share * float((x1 - x0) * (y1 - y0)));
-                level.solidity[i] = std::clamp(2.0f * share - 0.5f, 0.0f, 1.0f);
+                level.solidity[i] = std::clamp(4.0f * share - 0.5f, 0.0f, 1.0f);
             }
         }
     }

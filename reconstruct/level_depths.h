@@ -36,9 +36,9 @@ public:
     // Empty; cells lie on multiples of their width in the picture, and are wholly there: `rect` is
     // widened to them.
     void reset(const SubpixelRect& rect);
-    // level: 1 to highest().
+    // level: 1 to highest(); 0 for what leaves no gaps and only goes on with a surface of points.
     void add(int level, int x, int y, float depth) {
-        for (int l = level; l <= highest_; ++l) {
+        for (int l = std::max(level, 1); l <= highest_; ++l) {
             Level& to = levels_[size_t(l - 1)];
             float& cell = (l == level ? to.native : to.finer)[to.index(x >> l, y >> l)];
             cell = std::min(cell, depth);
@@ -61,7 +61,7 @@ private:
         int x0 = 0, y0 = 0, width = 0, height = 0;  // in cells
         // Nearest depth of points of this level, and of points of finer ones.
         std::vector<float> native, finer;
-        std::vector<float> around;    // farthest depth of a cell and its neighbours
+        std::vector<float> around;    // farthest depth of a cell and its neighbours, of any points
         std::vector<float> solidity;  // [0, 1], of a cell at a silhouette
         std::vector<float> farthest;  // of 4 x 4 cells of `native`
 
@@ -69,7 +69,7 @@ private:
     };
 
     // Depth of a cell's surface, infinite where there is none.
-    float surfaceAt(const Level& level, int x, int y) const;
+    float surfaceAt(int l, int x, int y) const;
     float behind(float depth, int level) const {
         return threshold_ * float(1 << level) * (orthographic_ ? 1.0f : depth);
     }
@@ -77,7 +77,8 @@ private:
 
     const bool orthographic_, is_bilinear_;
     const int highest_;
-    const float threshold_;  // depth per depth, or metres, of three subpixels
+    const float per_subpixel_;  // width of a subpixel, metres per depth, or metres
+    const float threshold_;     // depth per depth, or metres, of three subpixels
     std::array<uint8_t, kWidthCodes> level_of_width_;
     std::vector<Level> levels_;  // level 1 first
 };

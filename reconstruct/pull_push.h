@@ -13,12 +13,12 @@
 // - The thesis tests a point against its level when it is drawn, so the picture depends on the
 //   points' order. Here all buffers are filled, by minima, before a subpixel is judged at the
 //   tile's end: the same, in one pass over the points.
-// - A cell at a silhouette counts by how much of it the surface fills, not as a whole, so colours
-//   bleed half a cell at most, and none from a straight edge on average.
+// - A cell at a silhouette counts by how much of it the surface fills, not as a whole, so that
+//   colours hardly bleed over straight edges, and never by more than a cell.
 // - Holes where two levels meet, open in the thesis: neither level's mesh covers what lies between
 //   the last cells' centres of both. Finer points therefore enter the coarser buffers, too, and
-//   count in cells next to one that has points of that level: the coarse mesh goes on for a cell
-//   below the finer one (level_depths.h).
+//   count in cells next to one that has points of that level, as do triangles: the coarse mesh goes
+//   on for a cell below the finer one (level_depths.h).
 // - Pyramids live in a tile with its halo, which is as wide as the levels reach, and lie on
 //   multiples of their cells: the picture is the same for any size of tiles.
 #pragma once

@@ -60,9 +60,11 @@ TEST(ReconstructMethods, aStraightEdgeIsWhereThePointsEnd) {
     // A subpixel, a quarter of a pixel, shows what lies anywhere in it: half a subpixel. Per-pixel
     // covers 2 x 2 subpixels on large surfaces, half a subpixel more. The gaussian's weights on
     // neighbouring pixels do not sum up to 1: 2 exp(-2 pi^2 sigma^2) / 2 pi = 0.06 pixels.
+    // A cell of pull-push, here a pixel, is a corner of the mesh if three eighths are filled.
     for (const Reconstruct method : kAll) {
         const float most = method == Reconstruct::kPerPixel   ? 0.26f
                            : method == Reconstruct::kGaussian ? 0.19f
+                           : method == Reconstruct::kPullPush ? 0.125f + 0.125f
                                                               : 0.13f;
         for (const float edge : {30.0f, 30.4f, 30.75f}) {
             TestFrame frame;
