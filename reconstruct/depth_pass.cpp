@@ -10,6 +10,7 @@ DepthPass::DepthPass(const ReconstructionContext& context, int splat_subpixels)
     : context_(context),
       is_splat_(splat_subpixels > 0),
       side_(is_splat_ ? splat_subpixels : 2),
+      splat_world_(is_splat_ ? float(context.settings.splat_world) : 0.0f),
       footprints_(float(context.settings.samples)),
       wants_counts_(context.picture->image().channelIndex("count") >= 0) {
     if (is_splat_) footprints_.wide_share.fill(1.0f);
@@ -125,7 +126,7 @@ bool DepthPass::take(const PointBlock& block, DepthTile& tile) {
         const uint32_t surface = block.width[i] >= kSurfaceCode ? kSurfaceBit : 0;
         const uint64_t key = DepthTile::pack(block.z[i], block.number[i] | surface);
         if (placed.covers[i] & kWide) {
-            is_used |= splat(tile, placed.x[i], placed.y[i], key);
+            is_used |= splat(tile, placed.x[i], placed.y[i], key, sideAt(block.z[i]));
         } else {
             uint64_t& slot = keys[placed.offset[i]];
             is_used |= key < slot;
@@ -157,6 +158,13 @@ void DepthPass::count(float sub_x, float sub_y) {
     ++counts_[size_t(py) * size_t(inner_.width() / s) + size_t(px)];
 }
 
+void DepthPass::addCount(int px, int py, PixelSums& sums) const {
+    if (!wants_counts_) return;
+    const int s = context_.view.subpixels;
+    sums.points += float(counts_[size_t(py - inner_.y0 / s) * size_t(inner_.width() / s) +
+                                 size_t(px - inner_.x0 / s)]);
+}
+
 // What is hidden is looked at again after every half tile of subpixels.
 void DepthPass::refreshAfter(uint64_t subpixels, DepthTile& tile) {
     since_refresh_ += subpixels;
@@ -166,14 +174,14 @@ void DepthPass::refreshAfter(uint64_t subpixels, DepthTile& tile) {
     }
 }
 
-bool DepthPass::splat(DepthTile& tile, float sub_x, float sub_y, uint64_t key) const {
+bool DepthPass::splat(DepthTile& tile, float sub_x, float sub_y, uint64_t key, int side) const {
     const SubpixelRect& rect = tile.rect();
-    const float half = 0.5f * float(side_ - 1);
+    const float half = 0.5f * float(side - 1);
     const int x0 = int(std::floor(sub_x - half)), y0 = int(std::floor(sub_y - half));
     bool is_used = false;
-    for (int y = std::max(y0, rect.y0); y < std::min(y0 + side_, rect.y1); ++y) {
+    for (int y = std::max(y0, rect.y0); y < std::min(y0 + side, rect.y1); ++y) {
         uint64_t* row = tile.row(y);
-        for (int x = std::max(x0, rect.x0); x < std::min(x0 + side_, rect.x1); ++x) {
+        for (int x = std::max(x0, rect.x0); x < std::min(x0 + side, rect.x1); ++x) {
             is_used |= key < row[x];
             row[x] = std::min(row[x], key);
         }

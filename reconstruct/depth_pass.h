@@ -18,20 +18,29 @@ public:
     // False if none of the block is in front.
     bool take(const PointBlock& block, DepthTile& tile);
     bool take(const TriangleBlock& block, DepthTile& tile);
+    // Side of the square that a point at depth z covers: fixed, or, with settings.splat_world and
+    // as a splat, of a size in the world, between 1 and the fixed size.
+    int sideAt(float z) const {
+        if (!(splat_world_ > 0.0f)) return side_;
+        const float side =
+            splat_world_ * float(context_.view.focal) / (context_.view.orthographic ? 1.0f : z);
+        return std::clamp(int(std::min(side, float(side_)) + 0.5f), 1, side_);
+    }
     // How many subpixels beyond the one it lies in a point may cover.
     int reach(bool narrow) const { return narrow && !is_splat_ ? 0 : side_ / 2; }
     const TileCounters& counters() const { return counters_; }
-    // Kept points a pixel of the tile, if asked for.
-    const std::vector<uint32_t>& counts() const { return counts_; }
+    // Kept points of a pixel of the tile, if asked for.
+    void addCount(int px, int py, PixelSums& sums) const;
 
 private:
-    bool splat(DepthTile& tile, float sub_x, float sub_y, uint64_t key) const;
+    bool splat(DepthTile& tile, float sub_x, float sub_y, uint64_t key, int side) const;
     void count(float sub_x, float sub_y);
     void refreshAfter(uint64_t subpixels, DepthTile& tile);
 
     const ReconstructionContext& context_;
     const bool is_splat_;
-    const int side_;  // of the square a wide point covers
+    const int side_;           // of the square a wide point covers
+    const float splat_world_;  // metres; 0: side_ holds at any depth
     FootprintTable footprints_;
     const bool wants_counts_;
     SubpixelRect inner_;

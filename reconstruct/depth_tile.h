@@ -36,6 +36,7 @@ public:
     }
     int stride() const { return rect_.width() + kPadding; }
     std::vector<uint64_t>& keys() { return keys_; }
+    const std::vector<uint64_t>& keys() const { return keys_; }
 
     // True if every subpixel of `rect` is covered by something nearer than z_min, by what
     // refreshHidden() saw last.

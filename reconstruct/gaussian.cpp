@@ -1,200 +1,183 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/gaussian.h>
 
-#include <reconstruct/depth_pass.h>
+#include <reconstruct/erode.h>
+#include <reconstruct/front_slack.h>
 #include <reconstruct/per_pixel.h>
-#include <reconstruct/shade.h>
+#include <reconstruct/pixel_filter.h>
+#include <reconstruct/split_pass.h>
+#include <reconstruct/surface_channels.h>
 
 namespace stipple {
 
 namespace {
 
-// Weighted sums of one pixel.
-struct Weighted {
-    Vec3 radiance = Vec3(0), normal = Vec3(0), albedo = Vec3(0);
-    float weight = 0.0f;
-};
+// Side of the squares that close large surfaces of k points a subpixel: odd, so that erosion takes
+// back exactly what they add; six points in each, so that hardly any hole is left.
+int closingSide(double k) {
+    constexpr int kMost = 15;
+    int side = 3;
+    while (side < kMost && double(side) * double(side) * k < 6.0) side += 2;
+    return side;
+}
 
 class Gaussian : public TileReconstruction {
 public:
     explicit Gaussian(const ReconstructionContext& context)
         : context_(context),
-          depth_pass_(context_, 0),
-          sigma_(std::max(0.05f, 0.5f * float(context.settings.splat_size))),
-          radius_(kCut * sigma_),
-          // A surface seen at 80 degrees gains 6 subpixels of depth for each subpixel sideways.
-          slack_(std::max(0.01f,
-                          context.view.orthographic ? 0.0f : 12.0f / float(context.view.focal))),
-          slack_metres_(context.view.orthographic ? 12.0f / float(context.view.focal) : 0.0f) {}
+          side_(closingSide(context.settings.samples)),
+          split_(context_, codesFromWidth(kWideInSides * float(side_)), side_),
+          filter_(context.view.subpixels, float(context.settings.splat_size) *
+                                              float(context.view.subpixels) / std::sqrt(12.0f)),
+          slack_(context.view) {}
 
     int passCount() const override { return 2; }
-    int halo() const override {
-        return int(std::ceil(radius_ * float(context_.view.subpixels))) + 2;
-    }
+    // Filling looks two subpixels around, twice, and erosion as far as points reach, at what points
+    // reach from further away.
+    int halo() const override { return filter_.margin() + 4 + 2 * split_.reach(false); }
 
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
         inner_ = inner;
         tile_.reset(outer, context_.base, kZBufferBit);
-        depth_pass_.begin(inner);
-        const int s = context_.view.subpixels;
-        width_ = inner.width() / s;
-        height_ = inner.height() / s;
-        sums_.assign(size_t(width_) * size_t(height_), {});
+        surfaces_.reset(outer, context_.base, kZBufferBit);
+        split_.begin(inner);
+        const int margin = filter_.margin();
+        shaded_.reset({std::max(outer.x0, inner.x0 - margin), std::max(outer.y0, inner.y0 - margin),
+                       std::min(outer.x1, inner.x1 + margin),
+                       std::min(outer.y1, inner.y1 + margin)});
+        shader_.forget();
+        channels_.forget();
     }
 
     void beginPass(int pass, const SampleLookup& lookup) override {
         pass_ = pass;
         lookup_ = &lookup;
         if (pass == 0) return;
+        closeSurfaces();
         if (context_.settings.fill) fillHoles(tile_, scratch_);
         tile_.refreshHidden();
-        takeTriangles();
     }
 
     bool hides(const SubpixelRect& rect, float z_min, bool narrow) override {
         if (!context_.settings.culling) return false;
-        const int reach = depth_pass_.reach(narrow);
-        return tile_.hides({rect.x0 - reach, rect.y0 - reach, rect.x1 + reach, rect.y1 + reach},
-                           (z_min - slack_metres_) / (1.0f + slack_));
+        if (pass_ == 1) return tile_.hides(rect, slack_.frontOf(z_min));
+        const auto grown = [&](int by) {
+            return SubpixelRect{rect.x0 - by, rect.y0 - by, rect.x1 + by, rect.y1 + by};
+        };
+        const int reach = split_.reach(narrow);
+        // Erosion shows nothing farther than what is there within the reach of a square.
+        return tile_.hides(grown(reach), z_min) || surfaces_.hides(grown(reach + side_ / 2), z_min);
     }
-    const SubpixelRect& region() const override { return tile_.rect(); }
+    const SubpixelRect& region() const override { return pass_ == 0 ? tile_.rect() : shaded_.rect; }
 
     bool take(const PointBlock& block) override {
-        if (pass_ == 0) return depth_pass_.take(block, tile_);
+        if (pass_ == 0) {
+            split_.take(block, tile_, surfaces_);
+            return true;
+        }
         average(block);
         return false;
     }
     bool take(const TriangleBlock& block) override {
-        return pass_ == 0 && depth_pass_.take(block, tile_);
+        return pass_ == 0 && split_.take(block, tile_);
     }
 
     void endTile(const SampleLookup& lookup) override {
-        const int s = context_.view.subpixels;
-        for (int py = 0; py < height_; ++py) {
-            for (int px = 0; px < width_; ++px) writePixel(lookup, px, py, s);
-        }
+        showFronts(lookup);
+        filter_.apply(shaded_, inner_, [&](int x, int y, PixelSums& sums) {
+            channels_.add(lookup, tile_, x, y, sums);
+            split_.addCount(x, y, sums);
+            context_.picture->write(x, y, sums);
+        });
     }
-    TileCounters counters() const override { return depth_pass_.counters(); }
+    TileCounters counters() const override { return split_.counters(); }
 
 private:
-    static constexpr float kCut = 2.5f;  // the Gaussian ends at this many sigmas
+    // A patch at least this many squares wide is a surface.
+    static constexpr float kWideInSides = 4.0f;
 
+    // Large surfaces, eroded, into tile_.
+    void closeSurfaces() {
+        // A surface may go on in triangles.
+        for (size_t i = 0; i < tile_.keys().size(); ++i) {
+            const uint64_t key = tile_.keys()[i];
+            if (DepthTile::numberOf(key) != kNoNumber && DepthTile::numberOf(key) & kAnyTriangle)
+                surfaces_.keys()[i] = std::min(surfaces_.keys()[i], key);
+        }
+        // What is left open is a subpixel or two, erosion would make a square of it.
+        if (context_.settings.fill) fillHoles(surfaces_, scratch_);
+        erodeSplats(
+            surfaces_, [&](float) { return side_ / 2; }, scratch_);
+        for (size_t i = 0; i < scratch_.size(); ++i) {
+            uint64_t& key = tile_.keys()[i];
+            const uint64_t near_key = surfaces_.keys()[i], far_key = scratch_[i];
+            // Points all around: a surface goes on here, and must not sink below a triangle close
+            // behind it for the depth that it gains within a square.
+            const bool is_within =
+                far_key != DepthTile::kEmpty && !(DepthTile::numberOf(far_key) & kAnyTriangle) &&
+                DepthTile::numberOf(key) != kNoNumber && DepthTile::numberOf(key) & kAnyTriangle;
+            key = std::min(key, is_within ? near_key : far_key);
+        }
+    }
+
+    // Sums of the points on each subpixel's front; `covered` counts them.
     void average(const PointBlock& block) {
         const View& view = context_.view;
-        const SubpixelRect& rect = tile_.rect();
+        const SubpixelRect& rect = shaded_.rect;
         for (int i = 0; i < block.count; ++i) {
             if (!block.keep[i]) continue;
-            const Vec2 p = view.project(Vec3(block.x[i], block.y[i], block.z[i]));
+            const Vec3 p_camera(block.x[i], block.y[i], block.z[i]);
+            const Vec2 p = view.project(p_camera);
             if (!(p.x >= float(rect.x0) && p.x < float(rect.x1) && p.y >= float(rect.y0) &&
                   p.y < float(rect.y1)))
                 continue;
-            const uint64_t front = tile_.row(int(p.y))[int(p.x)];
-            if (block.z[i] > DepthTile::depthOf(front) * (1.0f + slack_) + slack_metres_) continue;
-            SurfaceSample sample;
-            sample.depth = block.z[i];
-            sample.position_camera = Vec3(block.x[i], block.y[i], block.z[i]);
-            lookup_->lookUp(block.number[i], p.x, p.y, sample);
-            spread(sample, p, 1.0f);
+            const int x = int(p.x), y = int(p.y);
+            const uint64_t front = tile_.row(y)[x];
+            // A triangle is exact, it needs no points.
+            if (DepthTile::numberOf(front) & kAnyTriangle ||
+                !slack_.isOnFront(block.z[i], DepthTile::depthOf(front), block.width[i]))
+                continue;
+            shader_.showPoint(*lookup_, p_camera, block.number[i], p);
+            ShadedSubpixel& sum = shaded_.row(y)[x];
+            sum.radiance += shader_.radiance();
+            sum.covered += 1.0f;
         }
     }
 
-    // Every subpixel in which a triangle is in front counts as the points it would have had.
-    void takeTriangles() {
-        const SubpixelRect& rect = tile_.rect();
-        for (int y = rect.y0; y < rect.y1; ++y) {
-            for (int x = rect.x0; x < rect.x1; ++x) {
-                const uint64_t key = tile_.row(y)[x];
-                const uint32_t number = DepthTile::numberOf(key);
-                if (number == kNoNumber || !(number & kAnyTriangle)) continue;
-                const Vec2 p(float(x) + 0.5f, float(y) + 0.5f);
-                SurfaceSample sample;
-                sample.depth = DepthTile::depthOf(key);
-                Vec3 origin, direction;
-                context_.view.ray(p.x, p.y, origin, direction);
-                sample.position_camera = origin + direction * sample.depth;
-                lookup_->lookUp(number, p.x, p.y, sample);
-                spread(sample, p, float(context_.settings.samples));
+    // Means, and the front itself where no point lies in the subpixel.
+    void showFronts(const SampleLookup& lookup) {
+        shader_.forget();
+        for (int y = shaded_.rect.y0; y < shaded_.rect.y1; ++y) {
+            const uint64_t* keys = tile_.row(y);
+            ShadedSubpixel* row = shaded_.row(y);
+            for (int x = shaded_.rect.x0; x < shaded_.rect.x1; ++x) {
+                if (DepthTile::numberOf(keys[x]) == kNoNumber) continue;
+                if (row[x].covered > 0.0f) {
+                    row[x].radiance /= row[x].covered;
+                } else {
+                    shader_.show(lookup, keys[x], x, y);
+                    row[x].radiance = shader_.radiance();
+                }
+                row[x].covered = 1.0f;
+                row[x].depth = DepthTile::depthOf(keys[x]);
             }
         }
-    }
-
-    void spread(const SurfaceSample& sample, const Vec2& p_sub, float weight) {
-        const Vec3 shaded = shade(sample, (*context_.materials)[sample.material],
-                                  *context_.lighting, context_.view);
-        const float to_pixels = 1.0f / float(context_.view.subpixels);
-        const float x = (p_sub.x - float(inner_.x0)) * to_pixels - 0.5f,
-                    y = (p_sub.y - float(inner_.y0)) * to_pixels - 0.5f;
-        const int x0 = std::max(0, int(std::ceil(x - radius_))),
-                  x1 = std::min(width_ - 1, int(std::floor(x + radius_)));
-        const int y0 = std::max(0, int(std::ceil(y - radius_))),
-                  y1 = std::min(height_ - 1, int(std::floor(y + radius_)));
-        const float scale = -0.5f / (sigma_ * sigma_);
-        for (int py = y0; py <= y1; ++py) {
-            for (int px = x0; px <= x1; ++px) {
-                const float dx = float(px) - x, dy = float(py) - y;
-                const float w = weight * std::exp(scale * (dx * dx + dy * dy));
-                Weighted& sum = sums_[size_t(py) * size_t(width_) + size_t(px)];
-                sum.radiance += shaded * w;
-                sum.normal += sample.normal_world * w;
-                sum.albedo += sample.albedo * w;
-                sum.weight += w;
-            }
-        }
-    }
-
-    // Colour from the weighted sums; coverage and depth from the pixel's subpixels.
-    void writePixel(const SampleLookup& lookup, int px, int py, int s) {
-        PixelSums sums;
-        const int x0 = inner_.x0 + px * s, y0 = inner_.y0 + py * s;
-        uint64_t nearest = DepthTile::kEmpty;
-        for (int y = y0; y < y0 + s; ++y) {
-            for (int x = x0; x < x0 + s; ++x) {
-                const uint64_t key = tile_.row(y)[x];
-                sums.samples += 1.0f;
-                if (DepthTile::numberOf(key) == kNoNumber) continue;
-                nearest = std::min(nearest, key);
-                sums.covered += 1.0f;
-                sums.depth += DepthTile::depthOf(key);
-                sums.depth_max = std::max(sums.depth_max, DepthTile::depthOf(key));
-            }
-        }
-        const Weighted& sum = sums_[size_t(py) * size_t(width_) + size_t(px)];
-        if (sums.covered > 0.0f) {
-            SurfaceSample sample;
-            sample.depth = DepthTile::depthOf(nearest);
-            const float cx = float(x0) + 0.5f * float(s), cy = float(y0) + 0.5f * float(s);
-            lookup.lookUp(DepthTile::numberOf(nearest), cx, cy, sample);
-            sums.object = sample.object;
-            Weighted mean = sum;
-            if (!(sum.weight > 0.0f)) {  // no point near enough to the pixel's centre
-                Vec3 origin, direction;
-                context_.view.ray(cx, cy, origin, direction);
-                sample.position_camera = origin + direction * sample.depth;
-                mean = {shade(sample, (*context_.materials)[sample.material], *context_.lighting,
-                              context_.view),
-                        sample.normal_world, sample.albedo, 1.0f};
-            }
-            const float per_weight = sums.covered / mean.weight;
-            sums.radiance = mean.radiance * per_weight;
-            sums.normal = mean.normal * per_weight;
-            sums.albedo = mean.albedo * per_weight;
-        }
-        const size_t index = size_t(py) * size_t(width_) + size_t(px);
-        if (!depth_pass_.counts().empty()) sums.points = depth_pass_.counts()[index];
-        context_.picture->write(inner_.x0 / s + px, inner_.y0 / s + py, sums);
     }
 
     const ReconstructionContext context_;
-    DepthPass depth_pass_;
-    const float sigma_, radius_;  // pixels
-    const float slack_, slack_metres_;
+    const int side_;  // of the squares that close large surfaces
+    SplitPass split_;
+    PixelFilter filter_;
+    const FrontSlack slack_;
+    SubpixelShader shader_{context_};
+    SurfaceChannels channels_{context_};
     SubpixelRect inner_;
-    DepthTile tile_;
+    DepthTile tile_;      // what each subpixel shows; before the second pass, without surfaces
+    DepthTile surfaces_;  // large surfaces, closed
+    ShadedTile shaded_;
     std::vector<uint64_t> scratch_;
     int pass_ = 0;
     const SampleLookup* lookup_ = nullptr;
-    int width_ = 0, height_ = 0;
-    std::vector<Weighted> sums_;
 };
 
 }  // namespace

@@ -2,7 +2,8 @@
 #include <reconstruct/per_pixel.h>
 
 #include <reconstruct/depth_pass.h>
-#include <reconstruct/shade.h>
+#include <reconstruct/erode.h>
+#include <reconstruct/subpixel_shader.h>
 
 namespace stipple {
 
@@ -56,15 +57,18 @@ namespace {
 class PerPixel : public TileReconstruction {
 public:
     PerPixel(const ReconstructionContext& context, int splat_subpixels)
-        : context_(context), depth_pass_(context_, splat_subpixels) {}
+        : context_(context),
+          depth_pass_(context_, splat_subpixels),
+          is_splat_(splat_subpixels > 0) {}
 
     int passCount() const override { return 1; }
-    // Filling looks two subpixels around, at what points a reach further cover.
-    int halo() const override { return 2 + depth_pass_.reach(false); }
+    // Filling looks two subpixels around, at what points a reach further cover; so does erosion
+    // before.
+    int halo() const override { return 2 + depth_pass_.reach(false) * (is_splat_ ? 2 : 1); }
 
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
         inner_ = inner;
-        last_number_ = kNoNumber;
+        shader_.forget();
         tile_.reset(outer, context_.base, kZBufferBit);
         depth_pass_.begin(inner);
     }
@@ -80,6 +84,11 @@ public:
     bool take(const TriangleBlock& block) override { return depth_pass_.take(block, tile_); }
 
     void endTile(const SampleLookup& lookup) override {
+        if (is_splat_) {
+            const auto reach = [&](float depth) { return (depth_pass_.sideAt(depth) - 1) / 2; };
+            erodeSplats(tile_, reach, scratch_);
+            tile_.keys().swap(scratch_);
+        }
         if (context_.settings.fill) fillHoles(tile_, scratch_);
         const int s = context_.view.subpixels;
         for (int py = inner_.y0 / s; py < inner_.y1 / s; ++py) {
@@ -90,12 +99,7 @@ public:
                     for (int x = px * s; x < (px + 1) * s; ++x)
                         addSubpixel(lookup, row[x], x, y, sums);
                 }
-                if (!depth_pass_.counts().empty()) {
-                    sums.points =
-                        depth_pass_
-                            .counts()[size_t(py - inner_.y0 / s) * size_t(inner_.width() / s) +
-                                      size_t(px - inner_.x0 / s)];
-                }
+                depth_pass_.addCount(px, py, sums);
                 context_.picture->write(px, py, sums);
             }
         }
@@ -105,34 +109,21 @@ public:
 private:
     // Shading is per subpixel.
     void addSubpixel(const SampleLookup& lookup, uint64_t key, int x, int y, PixelSums& sums) {
-        const uint32_t number = DepthTile::numberOf(key);
-        if (number == kNoNumber) {
+        if (DepthTile::numberOf(key) == kNoNumber) {
             sums.addNothing();
             return;
         }
-        // Neighbours often show the same point.
-        if (number != last_number_ || (number & kAnyTriangle)) {
-            last_.depth = DepthTile::depthOf(key);
-            const float sub_x = float(x) + 0.5f, sub_y = float(y) + 0.5f;
-            Vec3 origin, direction;
-            context_.view.ray(sub_x, sub_y, origin, direction);
-            last_.position_camera = origin + direction * last_.depth;
-            lookup.lookUp(number, sub_x, sub_y, last_);
-            last_shaded_ = shade(last_, (*context_.materials)[last_.material], *context_.lighting,
-                                 context_.view);
-            last_number_ = number;
-        }
-        sums.add(last_, last_shaded_);
+        shader_.show(lookup, key, x, y);
+        sums.add(shader_.sample(), shader_.radiance());
     }
 
     const ReconstructionContext context_;
     DepthPass depth_pass_;
+    const bool is_splat_;
     SubpixelRect inner_;
     DepthTile tile_;
     std::vector<uint64_t> scratch_;
-    uint32_t last_number_ = kNoNumber;
-    SurfaceSample last_;
-    Vec3 last_shaded_ = Vec3(0);
+    SubpixelShader shader_{context_};
 };
 
 }  // namespace

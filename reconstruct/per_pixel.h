@@ -8,8 +8,9 @@
 
 namespace stipple {
 
-// splat_subpixels: side of the square of constant depth that a point covers; 0: chosen by the patch
-// it lies on (per-pixel).
+// splat_subpixels: side of the square of constant depth that a point covers (the largest, with
+// settings.splat_world), taken back at silhouettes (erode.h); 0: chosen by the patch it lies on
+// (per-pixel).
 std::unique_ptr<TileReconstruction> makePerPixel(const ReconstructionContext& context,
                                                  int splat_subpixels);
 

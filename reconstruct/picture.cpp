@@ -60,7 +60,7 @@ std::string Picture::watchedPixel() const {
 }
 
 void Picture::write(int x, int y, const PixelSums& s) {
-    if (x == watched_x_ && y == watched_y_) watched_ = s;
+    if (isWatched(x, y)) watched_ = s;
     const float coverage = s.samples > 0.0f ? s.covered / s.samples : 0.0f;
     Vec3 color = s.samples > 0.0f ? s.radiance / s.samples : Vec3(0.0f);
     if (!transparent_ && coverage < 1.0f) {

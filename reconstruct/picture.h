@@ -51,6 +51,7 @@ public:
     Image& image() { return image_; }
     // Keeps the sums of one pixel for the description below.
     void watch(int x, int y) { watched_x_ = x, watched_y_ = y; }
+    bool isWatched(int x, int y) const { return x == watched_x_ && y == watched_y_; }
     // One line on what was found in the watched pixel.
     std::string watchedPixel() const;
 

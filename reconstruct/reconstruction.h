@@ -53,6 +53,12 @@ public:
     virtual TileCounters counters() const = 0;
 };
 
+// The settings with which a frame is drawn for settings.reconstruct. Reconstructions that use all
+// points, not only the nearest of a subpixel, draw more and smaller subpixels with as many points
+// as long as at least about one point falls into each: at 1 x 1 subpixels of 4 points, 2 x 2 of
+// one. Never above 4 x 4, where edges have gradations enough.
+RenderSettings drawnSettings(const RenderSettings& settings);
+
 // One instance a thread.
 std::unique_ptr<TileReconstruction> makeReconstruction(const ReconstructionContext& context);
 

@@ -76,6 +76,12 @@ void PointWriter::add(const InstanceFrame& frame, const ListName& name, const Ru
             context_.lists.points(name, first, int(n), run.list_length, scratch_, lane);
         transformPoints(params, list, lane, first, int(n), context_.nextNumber(), block_.count,
                         block_);
+        if (!density.narrow && context_.sink->wantsSurfels()) {
+            const View& view = context_.view;
+            makeSurfels({frame.camera_from_normal, float(view.focal), float(density.wanted),
+                         view.orthographic},
+                        list, lane, int(n), block_.count, block_);
+        }
         run.first_index = first;
         context_.runs.push_back(run);
         block_.count += int(n);

@@ -4,6 +4,7 @@
 #include <core/rng.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace stipple {
 
@@ -85,6 +86,53 @@ __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) vo
         params.random ? transformLoop<false, true>(params, l, f, i, count, number, lane, out)
                       : transformLoop<false, false>(params, l, f, i, count, number, lane, out);
     }
+}
+
+namespace {
+
+template <bool kOrthographic>
+inline __attribute__((always_inline)) void surfelLoop(const SurfelParams& params,
+                                                      const ListBlock& list, int first_lane,
+                                                      int count, int lane, PointBlock& out) {
+    const Mat3& m = params.camera_from_normal;
+    const float m00 = m[0].x, m01 = m[1].x, m02 = m[2].x;
+    const float m10 = m[0].y, m11 = m[1].y, m12 = m[2].y;
+    const float m20 = m[0].z, m21 = m[1].z, m22 = m[2].z;
+    const float f2 = params.focal * params.focal * params.density;
+    const int16_t* __restrict qx = list.normal[0] + first_lane;
+    const int16_t* __restrict qy = list.normal[1] + first_lane;
+    const int16_t* __restrict qz = list.normal[2] + first_lane;
+    const float* __restrict px = out.x + lane;
+    const float* __restrict py = out.y + lane;
+    const float* __restrict pz = out.z + lane;
+    float* __restrict normal_x = out.normal_x + lane;
+    float* __restrict normal_y = out.normal_y + lane;
+    float* __restrict normal_z = out.normal_z + lane;
+    float* __restrict area = out.area + lane;
+    for (int i = 0; i < count; ++i) {
+        const float ox = float(qx[i]), oy = float(qy[i]), oz = float(qz[i]);
+        const float x = m00 * ox + m01 * oy + m02 * oz;
+        const float y = m10 * ox + m11 * oy + m12 * oz;
+        const float z = m20 * ox + m21 * oy + m22 * oz;
+        const float scale = 1.0f / std::sqrt(std::max(x * x + y * y + z * z, 1e-30f));
+        normal_x[i] = x * scale;
+        normal_y[i] = y * scale;
+        normal_z[i] = z * scale;
+        // The projection factor; nothing is seen edge-on.
+        const float facing =
+            kOrthographic ? z * scale
+                          : (x * px[i] + y * py[i] + z * pz[i]) * scale / (pz[i] * pz[i] * pz[i]);
+        area[i] = 1.0f / std::max(f2 * std::abs(facing), 1e-30f);
+    }
+}
+
+}  // namespace
+
+__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void makeSurfels(
+    const SurfelParams& params, const ListBlock& list, int first_lane, int count, int lane,
+    PointBlock& out) {
+    params.orthographic ? surfelLoop<true>(params, list, first_lane, count, lane, out)
+                        : surfelLoop<false>(params, list, first_lane, count, lane, out);
 }
 
 }  // namespace stipple

@@ -32,4 +32,16 @@ void transformPoints(const KernelParams& params, const ListBlock& list, int firs
                      uint32_t first_index, int count, uint32_t first_number, int lane,
                      PointBlock& out);
 
+// What surfels need.
+struct SurfelParams {
+    Mat3 camera_from_normal = Mat3(1.0f);  // takes object-space normals to camera space (not unit)
+    float focal = 1.0f;                    // subpixels
+    float density = 1.0f;                  // kept points per subpixel of projected area
+    bool orthographic = false;
+};
+
+// Normals and areas of lanes [lane, lane + count) of `out`, whose positions are there.
+void makeSurfels(const SurfelParams& params, const ListBlock& list, int first_lane, int count,
+                 int lane, PointBlock& out);
+
 }  // namespace stipple

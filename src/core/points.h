@@ -79,6 +79,12 @@ struct PointBlock {
     alignas(64) uint32_t number[kBlockPoints + kBlockPadding];  // names the point within its tile
     alignas(64) uint8_t keep[kBlockPoints + kBlockPadding];     // 1: kept by thinning, 0: not there
     alignas(64) uint8_t width[kBlockPoints + kBlockPadding];    // patchWidthCode(), in subpixels
+    // Only for sinks that want surfels: geometric normal (unit, camera space, either side) and the
+    // area that a kept point stands for, m^2. Not filled where the width is kNoPatch.
+    alignas(64) float normal_x[kBlockPoints + kBlockPadding];
+    alignas(64) float normal_y[kBlockPoints + kBlockPadding];
+    alignas(64) float normal_z[kBlockPoints + kBlockPadding];
+    alignas(64) float area[kBlockPoints + kBlockPadding];
 };
 
 // Says whether a triangle of a block has surface at a subpixel (alpha masks).
@@ -114,6 +120,8 @@ public:
     // it lies in (kNoPatch).
     virtual bool hides(const SubpixelRect& rect, float z_min, bool narrow) = 0;
     virtual const SubpixelRect& region() const = 0;  // subpixels the sink wants, tile and halo
+    // True if blocks must have normals and areas.
+    virtual bool wantsSurfels() const { return false; }
 };
 
 // Emits a source's batches for one tile; used by one thread. Numbers stay valid until forget().

@@ -13,7 +13,8 @@
 namespace stipple {
 
 enum class Method { kPoints, kZBuffer, kRaycast };
-enum class Reconstruct { kPerPixel, kSplat, kGaussian };
+enum class Reconstruct { kPerPixel, kSplat, kGaussian, kPullPush, kEwa };
+enum class PullPushCoverage { kBilinear, kSquares };
 enum class Sampler { kStratified, kRandom };
 
 struct RenderSettings {
@@ -25,7 +26,12 @@ struct RenderSettings {
     int subpixels = 4;     // along one side of a pixel
     Sampler sampler = Sampler::kStratified;
     Reconstruct reconstruct = Reconstruct::kPerPixel;
-    double splat_size = 1.0;  // pixels, side of a square splat (splat), or 2 sigma (gaussian)
+    double splat_size = 1.0;   // pixels, side of a square splat, or of the box that a Gaussian of
+                               // the same variance stands for (gaussian)
+    double splat_world = 0.0;  // metres, side of a splat in the world; 0: splat_size alone
+    PullPushCoverage pull_push_coverage = PullPushCoverage::kBilinear;
+    bool pull_push_threshold = true;  // a coarse depth hides only what lies three pixels behind it
+    double ewa_prefilter = 0.4;       // standard deviation, subpixels
     bool shadows = false;
     bool ao = false;
     uint64_t seed = 1;

@@ -110,8 +110,10 @@ Renderer::Renderer(const Scene& scene, ThreadPool& pool)
     : impl_(std::make_unique<Impl>(scene, pool)) {}
 Renderer::~Renderer() = default;
 
-Frame Renderer::render(const FrameRequest& request) {
+Frame Renderer::render(const FrameRequest& asked) {
     Frame frame;
+    FrameRequest request = asked;
+    request.settings = drawnSettings(asked.settings);
     const View view = makeView(request.camera, request.settings.width, request.settings.height,
                                request.settings.subpixels);
     const Stopwatch watch;

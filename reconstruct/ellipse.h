@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// A surfel in the picture: a disc's ellipse around its projected centre, a filter kernel of that
+// shape, and the depth of its plane.
+// Based on: Ni. Hybrid 3D-Model Representation. 2005 (J V J^T + I); Zwicker et al. EWA Splatting.
+// 2002.
+#pragma once
+
+#include <core/camera.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace stipple {
+
+// Symmetric 2 x 2 matrix of a Gaussian's variance, in subpixels squared.
+struct Variance {
+    float xx = 0.0f, xy = 0.0f, yy = 0.0f;
+
+    // With an isotropic Gaussian added.
+    Variance plus(float variance) const { return {xx + variance, xy, yy + variance}; }
+    Variance times(float scale) const { return {xx * scale, xy * scale, yy * scale}; }
+    float determinant() const { return xx * yy - xy * xy; }
+};
+
+struct Ellipse {
+    Vec2 center = Vec2(0);  // subpixels
+    Variance unit;          // J J^T: of a disc of radius 1 m
+    // Depth of the plane at the centre + d: 1 / (q + dot(slope, d)), or q + dot(slope, d) in
+    // orthographic views.
+    float q = 0.0f;
+    Vec2 slope = Vec2(0);
+    float cosine = 1.0f;  // between normal and ray, at least kEdgeOn
+
+    // Planes seen more edge-on than this are turned towards the eye.
+    static constexpr float kEdgeOn = 0.1f;
+};
+
+// p, n: centre and unit normal in camera space.
+inline Ellipse makeEllipse(const View& view, const Vec3& p, Vec3 n) {
+    Ellipse e;
+    e.center = view.project(p);
+    const Vec3 ray = view.orthographic ? Vec3(0, 0, 1) : p / glm::length(p);
+    float cosine = glm::dot(n, ray);
+    if (cosine < 0.0f) n = -n, cosine = -cosine;
+    if (cosine < Ellipse::kEdgeOn) {
+        n = glm::normalize(n + ray * (Ellipse::kEdgeOn - cosine));
+        cosine = glm::dot(n, ray);
+    }
+    e.cosine = cosine;
+    const Vec3 s =
+        glm::normalize(std::abs(n.z) > std::abs(n.x) ? Vec3(0, n.z, -n.y) : Vec3(-n.y, n.x, 0));
+    const Vec3 t = glm::cross(n, s);
+    const float f = float(view.focal);
+    Vec2 js, jt;
+    if (view.orthographic) {
+        js = Vec2(s.x, s.y) * f, jt = Vec2(t.x, t.y) * f;
+        e.q = p.z;
+        e.slope = Vec2(n.x, n.y) * (-1.0f / (f * n.z));
+    } else {
+        const float scale = f / (p.z * p.z);
+        js = Vec2(s.x * p.z - s.z * p.x, s.y * p.z - s.z * p.y) * scale;
+        jt = Vec2(t.x * p.z - t.z * p.x, t.y * p.z - t.z * p.y) * scale;
+        // On the plane n.p = d, 1 / z is affine in the picture.
+        const float d = glm::dot(n, p);
+        e.q = 1.0f / p.z;
+        e.slope = Vec2(n.x, n.y) / (f * d);
+    }
+    e.unit = {js.x * js.x + jt.x * jt.x, js.x * js.y + jt.x * jt.y, js.y * js.y + jt.y * jt.y};
+    return e;
+}
+
+// Depth of the plane there; the centre's where the plane is not in front of the eye.
+inline float planeDepth(const View& view, const Ellipse& e, const Vec2& d) {
+    const float q = e.q + glm::dot(e.slope, d);
+    if (view.orthographic) return q;
+    return q > 0.25f * e.q ? 1.0f / q : 1.0f / e.q;
+}
+
+// Calls visit(x, y, d, r) for the centres at d from the ellipse's centre, within x0..y1, for which
+// r = d^T v^-1 d < r_max.
+template <class Visit>
+void visitEllipse(const Vec2& center, const Variance& v, float r_max, int x0, int y0, int x1,
+                  int y1, const Visit& visit) {
+    const float det = v.determinant();
+    if (!(det > 0.0f)) return;
+    const float a = v.yy / det, b = -v.xy / det, c = v.xx / det;
+    const float half_x = std::sqrt(r_max * v.xx), half_y = std::sqrt(r_max * v.yy);
+    // Clamped before they become integers.
+    const auto first = [](float value, int lo, int hi) {
+        return int(std::ceil(std::clamp(value, float(lo), float(hi))));
+    };
+    const int left = first(center.x - half_x - 0.5f, x0, x1),
+              right = first(center.x + half_x - 0.5f, x0, x1);
+    const int top = first(center.y - half_y - 0.5f, y0, y1),
+              bottom = first(center.y + half_y - 0.5f, y0, y1);
+    for (int y = top; y < bottom; ++y) {
+        const float dy = float(y) + 0.5f - center.y;
+        for (int x = left; x < right; ++x) {
+            const float dx = float(x) + 0.5f - center.x;
+            const float r = a * dx * dx + 2.0f * b * dx * dy + c * dy * dy;
+            if (r < r_max) visit(x, y, Vec2(dx, dy), r);
+        }
+    }
+}
+
+// The kernel: (1 - r / 8)^4, which is exp(-r / 2) within 0.09 and ends at r = 8.
+inline constexpr float kKernelEnd = 8.0f;
+inline float kernel(float r) {
+    const float t = 1.0f - r * (1.0f / kKernelEnd);
+    return t * t * t * t;
+}
+// Its integral over the picture.
+inline float kernelIntegral(const Variance& v) {
+    return 1.6f * 3.14159265f * std::sqrt(std::max(v.determinant(), 0.0f));
+}
+
+}  // namespace stipple
