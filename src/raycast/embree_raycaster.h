@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The yardstick: the scene ray-cast by Embree, the only place that knows it. Innermost groups (of
-// meshes only) use Embree's one instance level, groups that are placed once are dissolved into the one
-// above; what is nested deeper are user geometries whose callbacks transform the ray and trace the
-// child scene.
+// meshes only) use Embree's one instance level, groups that are placed once are dissolved into the
+// one above; what is nested deeper are user geometries whose callbacks transform the ray and trace
+// the child scene.
 #pragma once
 
 #include <core/parallel.h>
