@@ -28,7 +28,8 @@ bool fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
                 const float d = DepthTile::depthOf(key);
                 if (d * 1.02f < here) {
                     ++in_front;
-                    on_surface += (DepthTile::numberOf(key) & kKindBits) == kSurfaceBit;
+                    on_surface +=
+                        (DepthTile::numberOf(key) & (kAnyTriangle | kSurfaceBit)) == kSurfaceBit;
                     farthest_front = std::max(farthest_front, d);
                     if (d < nearest_depth) nearest_depth = d, nearest = key;
                 }

@@ -45,9 +45,9 @@ inline constexpr int kBlockPoints = 64;
 // test.
 inline constexpr uint32_t kZBufferBit = 0x80000000u;   // a triangle of the frame's z-buffer
 inline constexpr uint32_t kTriangleBit = 0x40000000u;  // a triangle emitted in the tile
-inline constexpr uint32_t kSurfaceBit = 0x20000000u;   // a point on a wide patch (kSurfaceWidth)
+// Set by reconstructions in their keys alone: a point on a wide patch (kSurfaceWidth).
+inline constexpr uint32_t kSurfaceBit = 0x20000000u;
 inline constexpr uint32_t kAnyTriangle = kZBufferBit | kTriangleBit;
-inline constexpr uint32_t kKindBits = kAnyTriangle | kSurfaceBit;
 
 // Kernels work on whole vectors and may write this far beyond a block's last point.
 inline constexpr int kBlockPadding = 16;
