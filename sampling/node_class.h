@@ -26,15 +26,23 @@ inline constexpr float kThinNode = 2.0f;
 // of a tile.
 inline constexpr float kTileShare = 0.0833f;
 
+// On surfaces, where points would have to close holes, triangles are rasterized from this share of
+// settings.area_threshold on; in foliage points are cheaper for longer.
+inline constexpr double kSurfaceThreshold = 0.25;
+
 // area_scale: largest area scale of the instance. Depends on nothing but the node and the view, so
 // planning and drawing agree.
-inline NodeClass classifyNode(const MeshNode& node, const BoxProjection& box, double area_scale,
-                              const RenderSettings& settings) {
+inline NodeClass classifyNode(const Mesh& mesh, const MeshNode& node, const BoxProjection& box,
+                              double area_scale, const RenderSettings& settings) {
     const bool is_leaf = node.child_count == 0;
     const bool is_mixed = node.stratum == kMixedStratum;
     const double bound = box.bound * area_scale;
     const double largest = projectedArea(node.max_triangle_area, bound);
-    if (largest <= settings.area_threshold) {
+    const bool may_be_surface =
+        is_mixed || projectedArea(double(mesh.strata[node.stratum].patch_width) *
+                                      double(mesh.strata[node.stratum].patch_width),
+                                  bound) > double(kSurfaceWidth * kSurfaceWidth);
+    if (largest <= settings.area_threshold * (may_be_surface ? kSurfaceThreshold : 1.0)) {
         const double n = settings.samples * bound * node.area;
         const bool fits =
             box.size <= kTileShare * float(settings.tile_size) && n <= settings.list_length;

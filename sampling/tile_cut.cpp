@@ -160,7 +160,7 @@ void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, cons
     const RenderSettings& settings = context_.settings;
     const Mesh& mesh = context_.scene.meshes[mesh_index];
     const MeshNode& node = mesh.nodes[node_index];
-    switch (classifyNode(node, box, frame.area_scale, settings)) {
+    switch (classifyNode(mesh, node, box, frame.area_scale, settings)) {
         case NodeClass::kPoints: {
             RunDensity density;
             density.wanted = settings.samples;

@@ -127,7 +127,8 @@ std::vector<Entry> makeEntries() {
         number("cut_ratio", &S::cut_ratio, 1.01, 100.0, "",
                "largest ratio of depths within a node of the cut", kOnlySet),
         number("area_threshold", &S::area_threshold, 0.0, 1e9, "subpixels",
-               "triangles of more than this projected area are rasterized, not drawn as points",
+               "triangles of more than this projected area (on surfaces: a quarter of it) are "
+               "rasterized, not drawn as points",
                kOnlySet),
         number("large_triangle", &S::large_triangle, 0.0, 1e9, "subpixels",
                "triangles of more than this projected area go to OSMesa, before the tiles",

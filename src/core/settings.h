@@ -35,11 +35,11 @@ struct RenderSettings {
     bool shadows = false;
     bool ao = false;
     uint64_t seed = 1;
-    int threads = 0;          // 0: one a core
-    int cache_mb = 256;       // point lists kept between frames; 0: off
-    double cut_ratio = 1.41;  // largest ratio of depths within a node of the cut
-    double area_threshold =
-        1.0;  // triangles larger than this many subpixels are not drawn as points
+    int threads = 0;              // 0: one a core
+    int cache_mb = 256;           // point lists kept between frames; 0: off
+    double cut_ratio = 1.41;      // largest ratio of depths within a node of the cut
+    double area_threshold = 4.0;  // triangles larger than this many subpixels are not drawn as
+                                  // points; on surfaces a quarter of it
     double large_triangle =
         1024.0;  // triangles larger than this many subpixels go to OSMesa, before the tiles
     int list_length = 1024;     // most points taken from a node's list before the node is opened
