@@ -187,7 +187,7 @@ void numberTriangles(FramePlan& plan) {
         draw.first_number = uint32_t(next - lowest);  // may wrap: first_number + triangle does not
         next += highest - lowest;
     }
-    if (next >= 0x80000000ull) {
+    if (next >= 0x7fffffffull) {  // the last one would look like kNoNumber
         throw Error(ErrorCode::kUnsupported, "",
                     "more than 2^31 triangles would be rasterized in one frame");
     }

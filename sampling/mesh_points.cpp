@@ -7,8 +7,11 @@ namespace stipple {
 
 namespace {
 
-// Fewer triangles hide little of each other.
+// So few triangles hide little of each other, and so few layers of surface.
 constexpr size_t kFewTriangles = 64;
+constexpr float kFewLayers = 1.2f;
+// A mesh of more (a terrain) is seldom a plant, and measuring it takes time and memory.
+constexpr size_t kManyTriangles = 400000;
 // Where nearly all points lie on the whole surface, all may.
 constexpr double kNearlyWhole = 0.97;
 // Directions are blurred by this much of their length, or instances would change all at once when
@@ -29,12 +32,15 @@ SeenMesh seeMesh(TileContext& context, const InstanceFrame& frame, uint32_t mesh
     SeenMesh seen;
     const Mesh& mesh = context.scene.meshes[mesh_index];
     if (!context.settings.visible_lists || context.settings.sampler == Sampler::kRandom ||
-        mesh.triangles.size() < kFewTriangles)
+        mesh.triangles.size() < kFewTriangles || mesh.triangles.size() > kManyTriangles)
         return seen;
     seen.direction = directionIndex(directionToEye(context.view, frame, mesh.bounds));
     const VisibleArea& visible = context.lists.visibleArea(mesh_index, seen.direction);
-    seen.whole_share = double(visible.whole_share.at(float(1.0 / std::sqrt(drawn))));
-    seen.layers = mesh.area / std::max(visible.area(mesh.nodes[0]), 1e-3 * mesh.area);
+    if (visible.layers < kFewLayers) return SeenMesh();
+    const float spacing = float(1.0 / std::sqrt(drawn));
+    seen.layers = double(visible.layers);
+    seen.part_share = double(visible.whole_share.aloneAt(spacing));
+    seen.whole_share = double(visible.whole_share.withVisibleAt(spacing));
     if (seen.whole_share <= kNearlyWhole) seen.visible = &visible;
     return seen;
 }
@@ -54,8 +60,8 @@ void addMeshPoints(TileContext& context, PointWriter& points, const InstanceFram
                 : 0;
         points.add(frame, {ChildRef::mesh(mesh_index), node_index, direction}, density, first, n);
     };
-    if (!seen.visible) {
-        add(ListName::kWhole, uint32_t(roundAtRandom(count, key)));
+    if (!seen.visible || node_index != 0) {
+        add(ListName::kWhole, uint32_t(roundAtRandom(count * seen.part_share, key)));
         return;
     }
     const double on_visible =

@@ -11,9 +11,11 @@ namespace stipple {
 struct SeenMesh {
     int direction = ListName::kWhole;
     const VisibleArea* visible =
-        nullptr;               // from that direction; nullptr: the whole surface is drawn
-    double whole_share = 1.0;  // of the points that lie on the whole surface
-    double layers = 1.0;       // its area over the visible one
+        nullptr;  // from that direction; nullptr: the whole surface is drawn
+    // Of the points on the whole surface: as many are drawn of the whole mesh, beside those on the
+    // visible area, and of its parts, which are many and would each need lists of their own.
+    double whole_share = 1.0, part_share = 1.0;
+    double layers = 1.0;  // of surface behind each other
 };
 
 // drawn: points per m^2 of object space on the whole surface, were all of it drawn. The instance

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstring>
+#include <utility>
 
 namespace stipple {
 
@@ -98,13 +99,17 @@ void PointLists::forEachSlot(const Visit& visit) {
     }
     for (auto& seen : seen_) {
         if (!seen.load()) continue;
-        for (Slot& slot : seen.load()->slots) visit(slot);
+        visit(seen.load()->slot);
     }
 }
 
 PointLists::Seen& PointLists::seen(uint32_t mesh_index, int direction) {
     std::atomic<Seen*>& place = seen_[mesh_index * kDirections + uint32_t(direction)];
-    if (Seen* seen = place.load(std::memory_order_acquire)) return *seen;
+    if (Seen* seen = place.load(std::memory_order_acquire)) {
+        if (seen->last_used.load(std::memory_order_relaxed) != frame_)
+            seen->last_used.store(frame_, std::memory_order_relaxed);
+        return *seen;
+    }
     const std::lock_guard lock(
         seen_stripes_[(mesh_index * kDirections + uint32_t(direction)) % kStripes]);
     if (Seen* seen = place.load(std::memory_order_acquire)) return *seen;
@@ -112,9 +117,8 @@ PointLists::Seen& PointLists::seen(uint32_t mesh_index, int direction) {
     auto seen = std::make_unique<Seen>();
     seen->area =
         measureVisibleArea(mesh, scene_.materials, scene_.textures, directionOf(direction));
-    seen->slots = Slots(mesh.nodes.size());
-    visible_bytes_ +=
-        seen->area.cumulative.size() * sizeof(float) + mesh.nodes.size() * sizeof(Slot);
+    seen->last_used = frame_;
+    visible_bytes_ += seen->bytes();
     place.store(seen.get(), std::memory_order_release);
     return *seen.release();
 }
@@ -125,12 +129,13 @@ const VisibleArea& PointLists::visibleArea(uint32_t mesh, int direction) {
 
 PointLists::Slot& PointLists::slotOf(const ListName& name) {
     const uint32_t index = name.child.index();
-    if (name.direction != ListName::kWhole) return seen(index, name.direction).slots[name.node];
+    if (name.direction != ListName::kWhole) return seen(index, name.direction).slot;
     return (name.child.isGroup() ? group_slots_ : mesh_slots_)[index][name.node];
 }
 
 void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
     retired_.clear();
+    bytes_ -= std::exchange(retired_bytes_, 0);
     budget_ = budget_bytes;
     const bool is_new = !(identity == identity_);
     identity_ = identity;
@@ -144,6 +149,16 @@ void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
     };
     if (is_full_.exchange(false)) drop(false);
     if (is_new || bytes_ > budget_) drop(true);
+    for (auto& place : seen_) {
+        Seen* seen = place.load();
+        if (bytes() <= budget_) break;
+        if (!seen || seen->last_used.load() == frame_) continue;
+        visible_bytes_ -= seen->bytes();
+        if (const List* list = seen->slot.list.load())
+            bytes_ -= list->block_count * sizeof(ListBlock);
+        delete seen->slot.list.load();
+        delete place.exchange(nullptr);
+    }
     ++frame_;
 }
 
@@ -265,11 +280,11 @@ PointLists::List* PointLists::grow(Slot& slot, const ListName& name, uint32_t n_
     uint32_t capacity = 1;
     while (capacity < n_blocks) capacity *= 2;
     const size_t added = capacity * sizeof(ListBlock);
-    if (bytes_.load(std::memory_order_relaxed) + added > budget_) {
+    if (bytes_.fetch_add(added) + added + visible_bytes_ > budget_) {
+        bytes_ -= added;
         is_full_.store(true, std::memory_order_relaxed);
         return nullptr;
     }
-    bytes_ += added;
     auto list = std::make_unique<List>();
     list->block_count = capacity;
     list->blocks = std::make_unique_for_overwrite<ListBlock[]>(capacity);
@@ -281,8 +296,8 @@ PointLists::List* PointLists::grow(Slot& slot, const ListName& name, uint32_t n_
     slot.list.store(result, std::memory_order_release);
     if (old) {
         // Other threads may still read it; it goes when the frame is over.
-        bytes_ -= have * sizeof(ListBlock);
         const std::lock_guard retired_lock(mutex_);
+        retired_bytes_ += have * sizeof(ListBlock);
         retired_.emplace_back(old);
     }
     return result;

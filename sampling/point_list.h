@@ -54,8 +54,8 @@ struct ListIdentity {
     bool operator==(const ListIdentity&) const = default;
 };
 
-// A sequence of points: on the whole surface below a node, or, on nodes of meshes, on what can be
-// seen of it from one of the directions of visible_area.h.
+// A sequence of points: on the whole surface below a node, or, for the root of a mesh, on what can
+// be seen of it from one of the directions of visible_area.h.
 struct ListName {
     static constexpr int kWhole = -1;
     ChildRef child;
@@ -75,8 +75,8 @@ public:
     // it did not suffice, lists that were not used in the last frame are dropped; where it has
     // become smaller than what is there, all are.
     void startFrame(const ListIdentity& identity, size_t budget_bytes);
-    // What can be seen of a mesh from a direction; measured when first asked for, then kept.
-    // Thread-safe.
+    // What can be seen of a mesh from a direction; measured when first asked for, then kept for the
+    // frame at least, and beyond it within the budget. Thread-safe.
     const VisibleArea& visibleArea(uint32_t mesh, int direction);
     // Points [first, first + count) of a sequence, which must not cross a multiple of 64:
     // lanes [first_lane, first_lane + count) of the block returned. From the cache, which first
@@ -96,7 +96,10 @@ private:
     // A mesh from one direction.
     struct Seen {
         VisibleArea area;
-        Slots slots;
+        Slot slot;  // of the root
+        std::atomic<uint32_t> last_used{0};
+
+        size_t bytes() const { return area.cumulative.size() * sizeof(float); }
     };
 
     const Slots& slotsOf(ChildRef child) const {
@@ -119,6 +122,7 @@ private:
     uint32_t frame_ = 0;
     std::mutex mutex_;  // guards retired_
     std::vector<std::unique_ptr<List>> retired_;
+    size_t retired_bytes_ = 0;
     static constexpr int kStripes = 64;
     std::mutex stripes_[kStripes];  // one list grows at a time in each stripe
     std::mutex seen_stripes_[kStripes];

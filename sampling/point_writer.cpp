@@ -66,10 +66,6 @@ void PointWriter::add(const InstanceFrame& frame, const ListName& name, const Ru
     while (count > 0) {
         const uint32_t n = std::min(count, kBlockPoints - first % kBlockPoints);
         if (block_.count + int(n) > kBlockPoints) flush();
-        if (context_.nextNumber() >= kSurfaceBit) {
-            throw Error(ErrorCode::kUnsupported, "",
-                        "too many points in one tile: take fewer samples or smaller tiles");
-        }
         if (block_.count == 0) first_run_ = context_.runs.size();
         int lane;
         const ListBlock& list =

@@ -35,8 +35,14 @@ struct TileContext {
     std::vector<Run> runs;
     std::vector<InstanceFrame> triangle_frames;
 
-    // Below kSurfaceBit.
-    uint32_t nextNumber() const { return uint32_t(runs.size()) * kBlockPoints; }
+    // Below kSurfaceBit; the one thing that may throw while a tile is drawn.
+    uint32_t nextNumber() const {
+        if (runs.size() >= kSurfaceBit / kBlockPoints) {
+            throw Error(ErrorCode::kUnsupported, "",
+                        "too many points in one tile: take fewer samples or smaller tiles");
+        }
+        return uint32_t(runs.size()) * kBlockPoints;
+    }
     const Run& runOf(uint32_t number) const {
         return runs[(number & ~kAnyTriangle) / kBlockPoints];
     }

@@ -10,6 +10,9 @@
 
 namespace stipple {
 
+// Drawing descends through nested groups by recursion; scenes come from strangers.
+inline constexpr int kDeepestNesting = 1000;
+
 // Node of the (loose) octree over a group's instances. An instance lies in the node whose cell is
 // as large as it is; those residents come first in the node's range, then the ranges of the
 // children.

@@ -283,6 +283,10 @@ void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool
         group.depth = std::max(group.depth, sums.depth);
         centers.extend(sums.centers);
     }
+    if (group.depth > kDeepestNesting) {
+        throw Error(ErrorCode::kInvalidScene, where,
+                    "groups are nested more than " + std::to_string(kDeepestNesting) + " deep");
+    }
     if (!group.bounds.isEmpty() && !isFinite(group.bounds.extent())) {
         throw Error(ErrorCode::kInvalidScene, where, "bounds are not finite");
     }

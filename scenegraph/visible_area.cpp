@@ -27,10 +27,10 @@ Vec3 directionOf(int index) {
     return glm::normalize(d);
 }
 
-float WholeShare::at(float spacing) const {
+float WholeShare::at(const std::array<float, kOctaves>& shares, float spacing) const {
     const float octave = std::clamp(std::log2(spacing / first_spacing), 0.0f, kOctaves - 1.001f);
     const int i = int(octave);
-    return share[size_t(i)] + (share[size_t(i) + 1] - share[size_t(i)]) * (octave - float(i));
+    return shares[size_t(i)] + (shares[size_t(i) + 1] - shares[size_t(i)]) * (octave - float(i));
 }
 
 namespace {
@@ -193,15 +193,15 @@ inline float expMinus(float x) {
 // one layer of surface keep away from each other: about (1 - 0.4 a)^2.5 of the places where a layer
 // has `a` of them in reach are missed by all, not exp(-a); layers behind each other are
 // independent.
-float solveShare(const Density& d, int window) {
-    const std::vector<float> whole = windowMeans(d, d.whole, window),
-                             visible = windowMeans(d, d.visible, window);
+float solveShare(const std::vector<float>& whole, const std::vector<float>& visible,
+                 bool with_visible) {
     double should = 0.0;
     for (const float v : visible) should += double(v);
     // What is covered grows with the share, less and less.
     const auto missing = [&](float share) {
         double covered = 0.0;
-        const float layer = -2.5f * std::log(1.0f - 0.4f * share), rest = 0.4f * (1.0f - share);
+        const float layer = -2.5f * std::log(1.0f - 0.4f * share),
+                    rest = with_visible ? 0.4f * (1.0f - share) : 0.0f;
         constexpr size_t kRun = 256;
         for (size_t k = 0; k < whole.size(); k += kRun) {
             const size_t end = std::min(whole.size(), k + kRun);
@@ -236,11 +236,16 @@ WholeShare measureWholeShare(const Grid& grid) {
         density.visible.push_back(grid.front[i] != kNoTriangle ? 1.0f : 0.0f);
     }
     constexpr int kWidestWindow = 4;
-    float smallest = 1.0f;
+    float with_visible = 1.0f, alone = 1.0f;
     for (int octave = 0, window = 1; octave < WholeShare::kOctaves; ++octave) {
-        if (density.width * density.height > 1)
-            smallest = std::min(smallest, solveShare(density, window));
-        result.share[size_t(octave)] = smallest;
+        if (density.width * density.height > 1) {
+            const std::vector<float> whole = windowMeans(density, density.whole, window),
+                                     visible = windowMeans(density, density.visible, window);
+            with_visible = std::min(with_visible, solveShare(whole, visible, true));
+            alone = std::min(alone, solveShare(whole, visible, false));
+        }
+        result.with_visible[size_t(octave)] = with_visible;
+        result.alone[size_t(octave)] = alone;
         if (window < kWidestWindow) {
             window *= 2;
         } else {
@@ -283,6 +288,9 @@ VisibleArea measureVisibleArea(const Mesh& mesh, const std::vector<Material>& ma
     result.cumulative.push_back(0.0f);
     for (const double v : visible) result.cumulative.push_back(float(sum += scale * v));
     result.whole_share = measureWholeShare(grid);
+    uint64_t layers = 0;
+    for (const uint16_t n : grid.layers) layers += n;
+    if (covered > 0) result.layers = float(double(layers) / double(covered));
     return result;
 }
 

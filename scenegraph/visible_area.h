@@ -20,14 +20,21 @@ inline constexpr int kDirections = 32;
 int directionIndex(const Vec3& direction);
 Vec3 directionOf(int index);  // its centre, unit
 
-// How much of the points on the whole surface must go along with those on the visible area so that
-// both cover, in expectation, what rays would find: by the distance between points, an octave each.
+// Share of the points on the whole surface with which a mesh covers, in expectation, what rays
+// would find: by the distance between points (were all drawn), an octave each. Falls with the
+// distance.
 struct WholeShare {
     static constexpr int kOctaves = 16;
-    float first_spacing = 1.0f;              // object space, m
-    std::array<float, kOctaves> share = {};  // in [0, 1]; falls with the distance
+    float first_spacing = 1.0f;                     // object space, m
+    std::array<float, kOctaves> with_visible = {};  // where the rest lies on the visible area
+    std::array<float, kOctaves> alone = {};         // where the rest is left out
 
-    float at(float spacing) const;  // interpolated
+    // Interpolated between octaves.
+    float withVisibleAt(float spacing) const { return at(with_visible, spacing); }
+    float aloneAt(float spacing) const { return at(alone, spacing); }
+
+private:
+    float at(const std::array<float, kOctaves>& shares, float spacing) const;
 };
 
 struct VisibleArea {
@@ -35,6 +42,7 @@ struct VisibleArea {
     // a distribution list.
     std::vector<float> cumulative;
     WholeShare whole_share;
+    float layers = 1.0f;  // of surface, one behind the other, where there is any
 
     double area(const MeshNode& node) const {
         return double(cumulative[node.first_triangle + node.triangle_count]) -

@@ -41,8 +41,8 @@ struct Batch {
 
 inline constexpr int kBlockPoints = 64;
 
-// Numbers are below 2^29 and carry the kind in their high bits, so that all kinds meet in one depth
-// test.
+// Numbers of points and of a tile's triangles are below 2^29, those of the z-buffer's below 2^31;
+// they carry the kind in their high bits, so that all kinds meet in one depth test.
 inline constexpr uint32_t kZBufferBit = 0x80000000u;   // a triangle of the frame's z-buffer
 inline constexpr uint32_t kTriangleBit = 0x40000000u;  // a triangle emitted in the tile
 // Set by reconstructions in their keys alone: a point on a wide patch (kSurfaceWidth).

@@ -244,6 +244,23 @@ TEST(MethodsAgree, sameBitsForAnyThreadsAndCaches) {
     }
 }
 
+TEST(MethodsAgree, aCacheThatOverflowsChangesNothing) {
+    const Scene scene = testScene(DVec3(0));
+    FrameRequest r = request(DVec3(0));
+    r.settings.cache_mb = 1;
+    ThreadPool pool(2);
+    Renderer renderer(scene, pool);
+    for (const double x : {6.0, -20.0, 6.0, 40.0, 6.0}) {
+        r.camera = lookAt(DVec3(x, 9, 22), DVec3(0, 4, -20));
+        const Frame frame = renderer.render(r);
+        FrameRequest uncached = r;
+        uncached.settings.cache_mb = 0;
+        EXPECT_EQ(frame.image.data, render(scene, uncached).data) << x;
+        // What is visible of the plants is kept beside the lists while a frame lasts.
+        EXPECT_LT(frame.stats.cache_bytes, size_t(3) << 20);
+    }
+}
+
 TEST(MethodsAgree, cullingChangesNothing) {
     const Scene scene = testScene(DVec3(0));
     FrameRequest r = request(DVec3(0));

@@ -103,6 +103,24 @@ TEST(ScenegraphGroupBuild, anInstanceTakesAtMost48Bytes) {
     EXPECT_LE(group.bytes(), 48u * 100000u);
 }
 
+TEST(ScenegraphGroupBuild, refusesNestingThatDrawingCouldNotDescend) {
+    for (const int depth : {kDeepestNesting, kDeepestNesting + 1}) {
+        Scene scene = boxes(1, 1);
+        for (int level = 1; level < depth; ++level) {
+            Group& group = scene.groups.emplace_back();
+            group.name = "level " + std::to_string(level);
+            group.instances.add(ChildRef::group(uint32_t(level - 1)), {});
+        }
+        scene.root = uint32_t(depth - 1);
+        ThreadPool pool(1);
+        if (depth <= kDeepestNesting) {
+            EXPECT_NO_THROW(buildScene(scene, pool));
+        } else {
+            EXPECT_THROW(buildScene(scene, pool), Error);
+        }
+    }
+}
+
 TEST(ScenegraphGroupBuild, namesTheFirstInstanceThatIsSingular) {
     Scene scene = boxes(0, 1);
     for (int i = 0; i < 50000; ++i) {

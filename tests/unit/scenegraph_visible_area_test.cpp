@@ -50,6 +50,7 @@ TEST(VisibleArea, onlyTheTopOfAStackIsSeenFromAbove) {
             below += double(seen.cumulative[t + 1]) - double(seen.cumulative[t]);
     }
     EXPECT_EQ(below, 0.0);
+    EXPECT_NEAR(seen.layers, 3.0f, 0.05f);
 }
 
 TEST(VisibleArea, singleSidedSurfacesAreNotSeenFromBehind) {
@@ -69,6 +70,7 @@ TEST(VisibleArea, halfOfASphereIsSeenFromAnywhere) {
         const VisibleArea seen =
             measureVisibleArea(sphere.mesh, sphere.materials, {}, directionOf(direction));
         EXPECT_NEAR(seen.area(sphere.mesh.nodes[0]) / sphere.mesh.area, 0.5, 0.02);
+        EXPECT_NEAR(seen.layers, 1.0f, 1e-3f);  // its back is not drawn
     }
 }
 
@@ -92,12 +94,15 @@ TEST(VisibleArea, theFartherTheLessOfTheWholeSurface) {
     buildMesh(tree.mesh, tree.materials, "tree");
     const WholeShare share =
         measureVisibleArea(tree.mesh, tree.materials, {}, Vec3(1.0f, 0.3f, 0.2f)).whole_share;
-    EXPECT_EQ(share.at(0.0f), 1.0f);
-    for (int i = 1; i < WholeShare::kOctaves; ++i)
-        EXPECT_LE(share.share[size_t(i)], share.share[size_t(i) - 1]);
+    EXPECT_EQ(share.withVisibleAt(0.0f), 1.0f);
+    for (size_t i = 1; i < size_t(WholeShare::kOctaves); ++i) {
+        EXPECT_LE(share.with_visible[i], share.with_visible[i - 1]);
+        EXPECT_LE(share.alone[i], share.alone[i - 1]);
+        EXPECT_LE(share.with_visible[i], share.alone[i] + 1e-3f);
+    }
     // Where the tree is much smaller than the distance between points, what is visible is enough.
-    EXPECT_LT(share.at(1e4f * share.first_spacing), 0.05f);
-    EXPECT_GT(share.at(4.0f * share.first_spacing), 0.2f);
+    EXPECT_LT(share.withVisibleAt(1e4f * share.first_spacing), 0.05f);
+    EXPECT_GT(share.withVisibleAt(4.0f * share.first_spacing), 0.2f);
 }
 
 }  // namespace
