@@ -199,6 +199,23 @@ TEST(IoSceneFile, readsCamerasLightsBackgroundAndRenderDefaults) {
     EXPECT_TRUE(loadChecked(s).scene.lighting.suns.empty());
 }
 
+TEST(IoSceneFile, lakesKeepTheirOwnRipples) {
+    Json s = minimal();
+    for (const char* name : {"lake_1", "lake_2"}) {
+        s["assets"][name] = Json::parse(
+            R"({"generate": "terrain", "resolution": 33, "relief": 50, "water_level": 20})");
+        s["assets"][name]["seed"] = name[5] - '0';
+    }
+    const Scene scene = loadChecked(s).scene;
+    ASSERT_EQ(scene.textures.size(), 2u);
+    EXPECT_NE(scene.textures[0].levels[0].rgba, scene.textures[1].levels[0].rgba);
+    std::vector<int> maps;
+    for (const Material& m : scene.materials) {
+        if (m.name == "water") maps.push_back(m.normal_map.texture);
+    }
+    EXPECT_EQ(maps, (std::vector<int>{0, 1}));
+}
+
 TEST(IoSceneFile, readsPaths) {
     Json s = minimal();
     s["paths"] = Json::parse(R"([
