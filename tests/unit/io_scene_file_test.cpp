@@ -216,6 +216,46 @@ TEST(IoSceneFile, lakesKeepTheirOwnRipples) {
     EXPECT_EQ(maps, (std::vector<int>{0, 1}));
 }
 
+TEST(IoSceneFile, aGroupMayHaveSeveralScatterRules) {
+    Json s = minimal();
+    const Json few = Json::parse(
+                   R"({"items": [{"child": "ball"}], "count": 7, "size": 10, "seed": 1})"),
+               more = Json::parse(
+                   R"({"items": [{"child": "ball"}], "count": 5, "size": 90, "seed": 2})");
+    const auto instances = [&](const Json& rules) {
+        s["groups"]["all"] = {{"scatter", rules}};
+        std::vector<DVec3> places;
+        const Scene scene = loadChecked(s).scene;
+        const InstanceStore& store = scene.groups[scene.root].instances;
+        for (size_t i = 0; i < store.size(); ++i)
+            places.push_back(store.groupFromChild(i).translation);
+        return places;
+    };
+    // The same places as each rule alone.
+    std::vector<DVec3> both = instances({few, more}), apart = instances(few);
+    for (const DVec3& p : instances(Json::array({more}))) apart.push_back(p);
+    ASSERT_GT(both.size(), 6u);
+    ASSERT_EQ(both.size(), apart.size());
+    const auto lessX = [](const DVec3& a, const DVec3& b) { return a.x < b.x; };
+    std::sort(both.begin(), both.end(), lessX);
+    std::sort(apart.begin(), apart.end(), lessX);
+    for (size_t i = 0; i < both.size(); ++i) EXPECT_LT(glm::length(both[i] - apart[i]), 1e-4);
+
+    const auto error = [&](const Json& rules) {
+        s["groups"]["all"] = {{"scatter", rules}};
+        const TempFolder folder;
+        return tryLoad(folder.write("s.scene.json", s.dump())).error;
+    };
+    Json wrong = few;
+    wrong["items"][0]["child"] = "bell";
+    EXPECT_NE(error({few, wrong}).find("/groups/all/scatter/1/items/0/child: "), std::string::npos)
+        << error({few, wrong});
+    wrong = few;
+    wrong["count"] = -1;
+    EXPECT_NE(error({few, wrong}).find("/groups/all/scatter/1/count: "), std::string::npos);
+    EXPECT_NE(error(Json::array()).find("/groups/all/scatter: "), std::string::npos);
+}
+
 TEST(IoSceneFile, readsPaths) {
     Json s = minimal();
     s["paths"] = Json::parse(R"([
