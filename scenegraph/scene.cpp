@@ -81,6 +81,13 @@ const Camera* Scene::findCamera(const std::string& name) const {
     return nullptr;
 }
 
+const CameraPath* Scene::findPath(const std::string& name) const {
+    for (const CameraPath& p : paths) {
+        if (p.name == name) return &p;
+    }
+    return nullptr;
+}
+
 SceneSize sceneSize(const Scene& scene) {
     SceneSize size;
     for (const Mesh& m : scene.meshes) {

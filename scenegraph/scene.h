@@ -3,7 +3,7 @@
 // expanded), cameras and lights.
 #pragma once
 
-#include <core/camera.h>
+#include <core/camera_path.h>
 #include <core/error.h>
 #include <core/light.h>
 #include <core/material.h>
@@ -25,11 +25,13 @@ struct Scene {
     std::vector<Group> groups;
     uint32_t root = 0;  // index into groups
     std::vector<Camera> cameras;
+    std::vector<CameraPath> paths;
     Lighting lighting;
     std::map<std::string, std::string>
         render_defaults;  // the scene file's "render": settings by name
 
     const Camera* findCamera(const std::string& name) const;
+    const CameraPath* findPath(const std::string& name) const;
 };
 
 // Of an instance's child, which has been built.

@@ -420,7 +420,10 @@ void saveGlb(const std::string& path, const Mesh& mesh, const std::vector<Materi
     if (fileBytes(mesh) > kMostMeshBytes)
         throw Error(ErrorCode::kInvalidArgument, path, "the mesh is too large for a .glb");
     std::vector<Material> untextured = materials;
-    for (Material& material : untextured) material.base_texture = kNoTexture;
+    for (Material& material : untextured) {
+        material.base_texture = kNoTexture;
+        material.normal_map = {};
+    }
     tinygltf::Model model = emptyModel(untextured);
     tinygltf::Node node;
     node.name = mesh.name;

@@ -227,6 +227,11 @@ GeneratedMesh heightMapTerrain(SceneReader& reader, const std::string& name, con
 ChildRef addGenerated(SceneReader& reader, const std::string& name, GeneratedMesh generated,
                       const JsonPath& path) {
     generated.mesh.name = oneLine(name);
+    const int first = int(reader.scene.textures.size());
+    for (Material& material : generated.materials) {
+        if (material.normal_map.texture != kNoTexture) material.normal_map.texture += first;
+    }
+    for (Texture& texture : generated.textures) reader.scene.textures.push_back(std::move(texture));
     return addModel(reader.scene, std::move(generated.mesh), std::move(generated.materials),
                     reader.where(path));
 }

@@ -42,6 +42,65 @@ void readCameras(SceneReader& reader, const Json& cameras) {
     }
 }
 
+// Without times the eye keeps one pace: times are the lengths of the way, in metres.
+void readKeyTimes(const SceneReader& reader, const Json& keys, const JsonPath& path,
+                  std::vector<CameraKey>& result) {
+    for (size_t i = 0; i < keys.size(); ++i) {
+        const JsonPath place = joined(path, {std::to_string(i)});
+        if (keys[i].contains("time") != keys[0].contains("time"))
+            reader.fail(place, "has a time and others have not; give all or none");
+        if (!keys[i].contains("time")) {
+            if (i == 0) continue;
+            const double way = glm::length(result[i].eye - result[i - 1].eye);
+            if (!(way > 1e-9))
+                reader.fail(place, "the eye is where it was before; give times to the keys");
+            result[i].time = result[i - 1].time + way;
+            continue;
+        }
+        result[i].time = keys[i]["time"].get<double>();
+        if (i > 0 && !(result[i].time > result[i - 1].time))
+            reader.fail(joined(place, {"time"}), "is not later than that of the key before");
+    }
+}
+
+CameraPath readPath(const SceneReader& reader, const Json& source, const JsonPath& path) {
+    CameraPath result;
+    result.name = source["name"].get<std::string>();
+    readVector(source, "up", result.up);
+    result.up = unitVector(reader, result.up, joined(path, {"up"}));
+    readMember(source, "near", result.near_z);
+    readMember(source, "far", result.far_z);
+    if (!(result.near_z < result.far_z)) reader.fail(path, "near is not less than far");
+    const Json& keys = source["keys"];
+    const JsonPath keys_path = joined(path, {"keys"});
+    result.aims_are_directions = keys[0].contains("direction");
+    for (size_t i = 0; i < keys.size(); ++i) {
+        const JsonPath place = joined(keys_path, {std::to_string(i)});
+        CameraKey key;
+        readVector(keys[i], "eye", key.eye);
+        const DVec3 direction = readDirection(reader, keys[i], key.eye, place);
+        if (keys[i].contains("direction") != result.aims_are_directions)
+            reader.fail(place, "some keys have target and some direction; give all the same");
+        key.aim = direction;
+        if (!result.aims_are_directions) readVector(keys[i], "target", key.aim);
+        if (i > 0) key.fov_y = result.keys.back().fov_y;
+        readDegrees(keys[i], "fov", key.fov_y);
+        result.keys.push_back(key);
+    }
+    readKeyTimes(reader, keys, keys_path, result.keys);
+    return result;
+}
+
+void readPaths(SceneReader& reader, const Json& paths) {
+    for (size_t i = 0; i < paths.size(); ++i) {
+        const JsonPath place = {"paths", std::to_string(i)};
+        CameraPath path = readPath(reader, paths[i], place);
+        if (reader.scene.findPath(path.name))
+            reader.fail(place, "a path before has the name " + inQuotes(path.name) + " too");
+        reader.scene.paths.push_back(std::move(path));
+    }
+}
+
 void readRenderDefaults(SceneReader& reader, const Json& settings) {
     RenderSettings scratch;  // values are checked here, where they have a place
     for (const auto& [key, value] : settings.items()) {
@@ -236,6 +295,7 @@ Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
         root_child.isGroup() ? root_child.index() : uint32_t(reader.scene.groups.size() - 1);
     readLighting(reader, root);
     if (root.contains("cameras")) readCameras(reader, root["cameras"]);
+    if (root.contains("paths")) readPaths(reader, root["paths"]);
     if (root.contains("render")) readRenderDefaults(reader, root["render"]);
     return std::move(reader.scene);
 }

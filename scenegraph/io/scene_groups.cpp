@@ -5,6 +5,7 @@
 #include <scenegraph/io/schemas.h>
 #include <scenegraph/io/transform.h>
 
+#include <deque>
 #include <functional>
 #include <limits>
 #include <optional>
@@ -287,13 +288,19 @@ void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Jso
         count(double(buffer->size()), buffer_path);
         domain.extend(buffer->domain());
     }
-    std::optional<ScatterRule> rule;
-    if (group.contains("scatter")) {
-        rule.emplace();
-        readScatter(reader, group["scatter"], scatter_path, *rule);
-        count(scatterMost(rule->params, rule->surface), scatter_path);
-        domain.extend(withPlace(reader, scatter_path,
-                                [&] { return scatterDomain(rule->params, rule->surface); }));
+    // One rule or a list; in place, as a rule's parameters point into it.
+    std::deque<ScatterRule> rules;
+    std::vector<JsonPath> rule_paths;
+    if (const auto source = group.find("scatter"); source != group.end()) {
+        for (size_t i = 0; i < (source->is_array() ? source->size() : 1); ++i) {
+            const JsonPath& place = rule_paths.emplace_back(
+                source->is_array() ? joined(scatter_path, {std::to_string(i)}) : scatter_path);
+            ScatterRule& rule = rules.emplace_back();
+            readScatter(reader, source->is_array() ? (*source)[i] : *source, place, rule);
+            count(scatterMost(rule.params, rule.surface), place);
+            domain.extend(
+                withPlace(reader, place, [&] { return scatterDomain(rule.params, rule.surface); }));
+        }
     }
     std::optional<GridParams> grid;
     if (group.contains("grid")) {
@@ -304,18 +311,21 @@ void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Jso
     if (domain.isEmpty()) domain = DBox3{DVec3(-1), DVec3(1)};
 
     InstanceStore store(domain);
-    if (!rule || rule->params.spacing == 0.0) store.reserve(size_t(total));
+    if (std::all_of(rules.begin(), rules.end(),
+                    [](const ScatterRule& rule) { return rule.params.spacing == 0.0; })) {
+        store.reserve(size_t(total));
+    }
     addInstances(reader, instances, store, path);
     if (buffer) buffer->addTo(store);
     reader.context.throwIfCancelled();
-    if (rule) {
+    for (size_t i = 0; i < rules.size(); ++i) {
         const size_t before = store.size();
-        withPlace(reader, scatter_path,
-                  [&] { scatter(rule->params, rule->surface, reader.pool, store); });
-        if (store.size() == before && rule->params.count > 0)
-            reader.context.warnOnce(reader.where(scatter_path), "nothing found a place");
+        withPlace(reader, rule_paths[i],
+                  [&] { scatter(rules[i].params, rules[i].surface, reader.pool, store); });
+        if (store.size() == before && rules[i].params.count > 0)
+            reader.context.warnOnce(reader.where(rule_paths[i]), "nothing found a place");
+        reader.context.throwIfCancelled();
     }
-    reader.context.throwIfCancelled();
     if (grid) withPlace(reader, grid_path, [&] { placeGrid(*grid, reader.pool, store); });
     reader.scene.groups[index].instances = std::move(store);
 }

@@ -12,11 +12,12 @@
 
 namespace stipple {
 
-// A mesh and the materials its triangle_material indexes (loaders append them to the scene and
-// shift the indices).
+// A mesh, the materials its triangle_material indexes and the textures that those index (loaders
+// append them to the scene and shift the indices).
 struct GeneratedMesh {
     Mesh mesh;  // not yet built (see buildMesh)
     std::vector<Material> materials;
+    std::vector<Texture> textures;  // of normal_map only
 };
 
 struct TreeParams {
@@ -122,8 +123,9 @@ HeightField makeHeightField(const TerrainParams& params);
 // The height field as a mesh with smooth normals and texture coordinates that span it, u along x
 // and v along z.
 Mesh heightFieldMesh(const HeightField& field);
-// The same without texture coordinates, coloured by height and slope; over what lies below the
-// water level, a second, flat surface with a material of its own ("water"). Of `params` only style,
+// The same coloured by height and slope, with texture coordinates on water only; over what lies
+// below the water level, a second, flat surface with a material of its own ("water") and ripples as
+// its normal map. Of `params` only style,
 // seed and water_level count.
 GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field);
 

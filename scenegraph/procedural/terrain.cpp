@@ -84,19 +84,28 @@ double rawHeight(TerrainStyle style, uint64_t key, const DVec2& p, int octaves) 
 
 // What the ground of a place is like, by which its material is chosen.
 struct GroundPlace {
-    DVec2 position;
+    DVec3 position;
+    double step = 0.0;             // metres between samples: what is finer is left out
     double relative_height = 0.0;  // 0: the lowest, 1: the highest
     double slope = 0.0;            // radians
     double hollow = 0.0;           // above 0: lower than around
     double above_water = 1e9;      // metres
 };
 
+// Noise in space, so that it is as coarse on a cliff as on level ground, without the octaves that
+// samples `step` apart cannot show: those would be streaks along the triangles' edges.
+double groundNoise(uint64_t key, const GroundPlace& place, double wavelength, int octaves) {
+    constexpr double kSamplesPerWave = 4.0;
+    while (octaves > 0 && wavelength / double(1 << (octaves - 1)) < kSamplesPerWave * place.step)
+        --octaves;
+    return octaves > 0 ? fractalNoise(key, place.position / wavelength, octaves) : 0.0;
+}
+
 DVec3 groundColor(TerrainStyle style, uint64_t key, const GroundPlace& place) {
-    const DVec2 p = place.position;
     const double slope = place.slope, hollow = place.hollow;
-    const double regions = fractalNoise(key + 25, p / 260.0, 3);
-    const double patches = fractalNoise(key, p / 45.0, 4),
-                 fine = fractalNoise(key + 50, p / 3.5, 3);
+    const double regions = groundNoise(key + 25, place, 260.0, 3);
+    const double patches = groundNoise(key, place, 45.0, 4),
+                 fine = groundNoise(key + 50, place, 3.5, 3);
     // Strata show where rock is bare.
     const double strata = std::sin(place.relative_height * 60.0 + 3.0 * patches + 2.0 * regions);
     const DVec3 rock = glm::mix(DVec3(0.235, 0.22, 0.2), DVec3(0.32, 0.295, 0.26),
@@ -146,9 +155,84 @@ DVec3 groundColor(TerrainStyle style, uint64_t key, const GroundPlace& place) {
     return color * (1.0 - 0.5 * smoothStep(0.5, 0.05, place.above_water));
 }
 
+// Cuts gullies into steep rock above the water, deeper between buttresses than on them; summits
+// stay.
+void cutGullies(HeightField& field, double relief, double feature_size, double water,
+                uint64_t key) {
+    const HeightField before = field;
+    const DVec2 step = field.size / DVec2(double(field.columns - 1), double(field.rows - 1));
+    const double wavelength = feature_size / 9.0, depth = 0.04 * relief;
+    const double reach = std::max(0.15 * wavelength, 2.0 * step.x);
+    const int octaves =
+        std::clamp(int(std::log2(std::max(wavelength / (4.0 * step.x), 1.0))) + 1, 1, 5);
+    for (int j = 0; j < field.rows; ++j) {
+        for (int i = 0; i < field.columns; ++i) {
+            const DVec2 p = DVec2(i, j) * step - 0.5 * field.size;
+            float& h = field.heights[size_t(j) * size_t(field.columns) + size_t(i)];
+            // Judged over some samples, so that a gully begins softly at its crest.
+            const DVec2 slope(before.height(p.x + reach, p.y) - before.height(p.x - reach, p.y),
+                              before.height(p.x, p.y + reach) - before.height(p.x, p.y - reach));
+            const double steep = smoothStep(0.35, 0.75, glm::length(slope) / (2.0 * reach)) *
+                                 smoothStep(0.02, 0.1, (double(h) - water) / relief);
+            if (steep <= 0.0) continue;
+            const DVec2 q = p / wavelength;
+            const DVec2 bend(fractalNoise(key + 1, q * 0.7, 2), fractalNoise(key + 2, q * 0.7, 2));
+            h -= float(depth * steep * (1.0 - ridgedNoise(key, q + 0.35 * bend, octaves)));
+        }
+    }
+}
+
 // Shores are flatter than hills. Monotone.
 double flattenShore(double above_water) {
     return above_water * (0.3 + 0.7 * smoothStep(0.0, 9.0, std::abs(above_water)));
+}
+
+constexpr double kRippleTile = 32.0;     // metres
+constexpr float kSteepestRipple = 0.5f;  // slope that the ripples' map can hold
+
+// Normals of waves 0.5 to 8 m long that wind has raised, kRippleTile wide and repeating: a map in
+// tangent space, x along +x and y along -z, whose slopes count kSteepestRipple.
+Texture rippleMap(uint64_t key) {
+    constexpr int kSize = 256, kWaves = 48;
+    constexpr double kSlope = 0.09;  // root mean square
+    struct Wave {
+        DVec2 count;  // over the tile
+        double phase;
+    };
+    std::vector<Wave> waves;
+    for (int i = 0; i < kWaves; ++i) {
+        const auto random = [&](int k) { return uniformDouble(hashCombine(key, 8 * i + k)); };
+        const double count = kRippleTile / (8.0 * std::pow(0.0625, random(0)));
+        const double angle = 0.6 + 2.0 * (random(1) + random(2) - 1.0);
+        waves.push_back(
+            {glm::round(count * DVec2(std::cos(angle), std::sin(angle))), 2.0 * kPi * random(3)});
+    }
+    // Each wave is as steep: short ones are low.
+    const double steepness = kSlope * std::sqrt(2.0 / kWaves);
+    Texture map;
+    map.name = "ripples";
+    map.srgb = false;
+    Texture::Level& level = map.levels.emplace_back();
+    level.width = level.height = kSize;
+    level.rgba.reserve(size_t(kSize) * kSize * 4);
+    const auto encoded = [](double slope) {
+        const double share = std::clamp(slope / double(kSteepestRipple), -1.0, 1.0);
+        return uint8_t(std::lround(127.5 + 127.5 * share));
+    };
+    for (int y = 0; y < kSize; ++y) {
+        for (int x = 0; x < kSize; ++x) {
+            const DVec2 p = (DVec2(x, y) + 0.5) / double(kSize);
+            DVec2 slope(0.0);
+            for (const Wave& w : waves) {
+                const double length = std::max(glm::length(w.count), 1.0);
+                slope += w.count * (steepness / length *
+                                    std::cos(2.0 * kPi * glm::dot(w.count, p) + w.phase));
+            }
+            level.rgba.insert(level.rgba.end(), {encoded(-slope.x), encoded(slope.y), 255, 255});
+        }
+    }
+    buildMipmaps(map);
+    return map;
 }
 
 // Over every cell that reaches below the water: flat, its colour by the depth beneath it, its
@@ -157,6 +241,7 @@ void appendWater(const HeightField& field, double level, uint64_t key, Generated
     Mesh& mesh = terrain.mesh;
     const size_t n = size_t(field.columns), rows = size_t(field.rows);
     const DVec2 step = field.size / DVec2(double(n - 1), double(rows - 1));
+    const double swell = std::max(14.0, 5.0 * step.x);  // wavelength, which samples can show
     std::vector<uint32_t> vertices(n * rows, UINT32_MAX);
     const auto vertexAt = [&](size_t i, size_t j) {
         uint32_t& v = vertices[j * n + i];
@@ -168,9 +253,10 @@ void appendWater(const HeightField& field, double level, uint64_t key, Generated
         const DVec3 shallow(0.055, 0.06, 0.04), deep(0.01, 0.024, 0.03);
         const DVec3 color = glm::mix(shallow, deep, smoothStep(-0.2, 3.5, depth + 0.5 * wind));
         const double roughness = 0.02 + 0.02 * smoothStep(-0.3, 0.4, wind);
-        const DVec3 normal(roughness * fractalNoise(key + 10, p / 14.0, 2), 1.0,
-                           roughness * fractalNoise(key + 20, p / 14.0, 2));
+        const DVec3 normal(roughness * fractalNoise(key + 10, p / swell, 2), 1.0,
+                           roughness * fractalNoise(key + 20, p / swell, 2));
         mesh.positions.push_back(Vec3(DVec3(p.x, level, p.y)));
+        mesh.uvs.push_back(Vec2(p / kRippleTile));
         mesh.normals.push_back(Vec3(glm::normalize(normal)));
         mesh.colors.push_back(Vec4(Vec3(color) * float(1.0 + 0.25 * wind), 1.0f));
         return v;
@@ -290,6 +376,8 @@ HeightField makeHeightField(const TerrainParams& params) {
                 h = float(params.relief - (double(*most) - double(h)) * stretch);
         }
     }
+    if (style == TerrainStyle::kMountain && params.erosion > 0.0 && scale > 0.0f)
+        cutGullies(field, params.relief, params.feature_size, water, hashCombine(key, 0x6711));
     if (water > 0.0) {
         for (float& h : field.heights) h = float(water + flattenShore(double(h) - water));
     }
@@ -331,7 +419,8 @@ GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field)
     GeneratedMesh result;
     Mesh& mesh = result.mesh;
     mesh = heightFieldMesh(field);
-    mesh.uvs = {};
+    // Only ripples on water are a texture.
+    mesh.uvs.assign(params.water_level > 0.0 ? mesh.positions.size() : 0, Vec2(0.0f));
     mesh.colors.reserve(mesh.positions.size());
     const FieldSampler sample{field};
     const auto [least, most] = std::minmax_element(field.heights.begin(), field.heights.end());
@@ -346,8 +435,9 @@ GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field)
                         sample.height(i, j - reach) + sample.height(i, j + reach));
             const double hollow = 4.0 * (around - p.y) / (reach * step);
             const double relative_height = relief > 0.0 ? (p.y - low) / relief : 0.0;
-            GroundPlace place{DVec2(p.x, p.z), relative_height, std::acos(std::min(normal.y, 1.0)),
-                              hollow};
+            // Samples lie farther apart along a slope.
+            GroundPlace place{p, step / std::max(normal.y, 0.2), relative_height,
+                              std::acos(std::min(normal.y, 1.0)), hollow};
             if (params.water_level > 0.0) place.above_water = p.y - params.water_level;
             const DVec3 color = groundColor(style, key, place);
             mesh.colors.push_back(Vec4(Vec3(glm::clamp(color, DVec3(0.0), DVec3(1.0))), 1.0f));
@@ -357,8 +447,13 @@ GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field)
     material.name = "ground";
     material.base_color = Vec3(1.0f);
     result.materials.push_back(material);
-    if (params.water_level > 0.0)
-        appendWater(field, params.water_level, hashCombine(params.seed, 0x7e46), result);
+    if (params.water_level > 0.0) {
+        const uint64_t water_key = hashCombine(params.seed, 0x7e46);
+        appendWater(field, params.water_level, water_key, result);
+        result.textures.push_back(rippleMap(water_key + 30));
+        result.materials.back().normal_map.texture = 0;
+        result.materials.back().normal_scale = kSteepestRipple;
+    }
     return result;
 }
 

@@ -20,7 +20,7 @@ using Json = nlohmann::ordered_json;
 const HelpText kHelp = {"stipple info SCENE [--json] [--export FILE]",
                         "Prints what is in a scene: instances, unique and expanded triangles, "
                         "memory, groups with their "
-                        "depth, cameras and materials.",
+                        "depth, cameras, paths and materials.",
                         {"stipple info scenes/forest.scene.json", "stipple info tree.glb --json",
                          "stipple info wood.scene.json --export wood.glb"}};
 
@@ -62,6 +62,8 @@ Json infoJson(const Scene& scene, const std::vector<std::string>& warnings) {
     }
     json["cameras"] = Json::array();
     for (const Camera& camera : scene.cameras) json["cameras"].push_back(camera.name);
+    json["paths"] = Json::array();
+    for (const CameraPath& p : scene.paths) json["paths"].push_back(p.name);
     json["materials"] = Json::array();
     for (const Material& material : scene.materials) json["materials"].push_back(material.name);
     json["textures"] = scene.textures.size();
@@ -114,6 +116,7 @@ void printInfo(const Json& info) {
         << "memory      " << byteSize(info["bytes"]) << ", of that "
         << byteSize(info["instance_bytes"]) << " for instances\n"
         << "cameras     " << joinNames(info["cameras"]) << "\n"
+        << "paths       " << joinNames(info["paths"]) << "\n"
         << "materials   " << joinNames(info["materials"]) << "\n"
         << "textures    " << info["textures"] << "\n";
     out << "groups\n";

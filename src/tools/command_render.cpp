@@ -7,6 +7,7 @@
 #include <tools/choose_camera.h>
 #include <tools/command_line.h>
 #include <tools/commands.h>
+#include <tools/frame_names.h>
 #include <tools/output_file.h>
 #include <tools/progress.h>
 #include <tools/signals.h>
@@ -15,7 +16,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
-#include <sstream>
+#include <string_view>
 
 namespace stipple {
 
@@ -25,6 +26,8 @@ struct RenderOptions {
     std::string scene;
     std::string output;
     std::string camera;
+    std::string path;
+    int frames = 0;  // of the path; 0: not given
     std::vector<std::string> aovs;
     bool transparent = false;
     int repeat = 1;
@@ -42,8 +45,10 @@ const std::vector<std::string> kAovNames = {"depth",  "normal",   "albedo",
 const HelpText kHelp = {
     "stipple render SCENE -o OUT.png|OUT.exr [options]",
     "Draws a picture of a scene and prints its path. SCENE is a scene file (*.scene.json) or a "
-    "single model (.gltf, .glb, .ply, .obj), for which a camera and a light are made.",
+    "single model (.gltf, .glb, .ply, .obj), for which a camera and a light are made. With --path, "
+    "one picture for each place along a camera path.",
     {"stipple render scenes/forest.scene.json -o forest.png --width 1920 --height 1080",
+     "stipple render scenes/forest.scene.json --path flight --frames 48 -o flight_%04d.png",
      "stipple render tree.glb -o tree.exr --aov depth,normal --samples 4 --stats tree.json"}};
 
 void addOptions(CLI::App& app, RenderOptions& options) {
@@ -58,6 +63,17 @@ void addOptions(CLI::App& app, RenderOptions& options) {
         ->group("Picture");
     app.add_option("--camera", options.camera, "a camera of the scene (default: the first)")
         ->type_name("NAME")
+        ->group("Picture");
+    app.add_option(
+           "--path", options.path,
+           "a camera path of the scene, drawn as --frames pictures; -o is a pattern such as "
+           "out_%04d.png")
+        ->type_name("NAME")
+        ->group("Picture");
+    app.add_option("--frames", options.frames,
+                   "pictures along the path, numbered from 0; first and last are its ends")
+        ->type_name("N")
+        ->check(CLI::Range(1, 1000000).description(""))
         ->group("Picture");
     app.add_option("--aov", options.aovs,
                    "further channels of an .exr, separated by commas: depth, normal, albedo, "
@@ -107,9 +123,34 @@ void checkDebugPixel(const std::string& text, const RenderSettings& settings) {
     }
 }
 
+// The picture's file, or those of the path's pictures.
+std::vector<std::string> outputNames(const RenderOptions& options) {
+    if (options.path.empty()) return {options.output};
+    std::vector<std::string> names;
+    for (int i = 0; i < options.frames; ++i) names.push_back(frameName("-o", options.output, i));
+    return names;
+}
+
+// --path and --frames belong together; what chooses one frame contradicts them.
+void checkPathOptions(const RenderOptions& options) {
+    if (options.path.empty() != (options.frames == 0)) {
+        throw Error(ErrorCode::kInvalidArgument, options.path.empty() ? "--frames" : "--path",
+                    options.path.empty() ? "needs --path" : "needs --frames");
+    }
+    if (options.path.empty()) return;
+    const char* other = !options.camera.empty()        ? "--camera"
+                        : options.repeat > 1           ? "--repeat"
+                        : !options.debug_pixel.empty() ? "--debug-pixel"
+                                                       : nullptr;
+    if (other)
+        throw Error(ErrorCode::kInvalidArgument, "--path", std::string("contradicts ") + other);
+}
+
 // What can be said about the command line before the scene is loaded.
 void checkOptions(const RenderOptions& options) {
-    checkOutputFile("-o", options.output, {".png", ".exr"});
+    checkPathOptions(options);
+    for (const std::string& name : outputNames(options))
+        checkOutputFile("-o", name, {".png", ".exr"});
     if (!options.stats.empty()) checkOutputFile("--stats", options.stats, {});
     for (const std::string& aov : options.aovs) {
         if (std::find(kAovNames.begin(), kAovNames.end(), aov) != kAovNames.end()) continue;
@@ -141,6 +182,23 @@ RenderSettings effectiveSettings(const RenderOptions& options, const Scene& scen
                     "is not yet available");
     }
     return settings;
+}
+
+// What the pictures are seen with, in order.
+std::vector<Camera> chooseCameras(const Scene& scene, const RenderOptions& options) {
+    if (options.path.empty()) return {chooseCamera(scene, options.camera)};
+    const CameraPath* path = scene.findPath(options.path);
+    if (!path) {
+        std::string known;
+        for (const CameraPath& p : scene.paths) known += (known.empty() ? "" : ", ") + p.name;
+        throw Error(ErrorCode::kInvalidArgument, "--path",
+                    "there is no '" + options.path + "'; " + scene.path +
+                        (known.empty() ? " has none" : " has: " + known));
+    }
+    std::vector<Camera> cameras;
+    for (int i = 0; i < options.frames; ++i)
+        cameras.push_back(cameraAt(*path, i / std::max(options.frames - 1.0, 1.0)));
+    return cameras;
 }
 
 // What an .exr says about how it was made. A .png says nothing, so that equal pictures are equal
@@ -184,19 +242,26 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
     progress.finish();
     for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
 
+    const std::vector<Camera> cameras = chooseCameras(scene, options);
+    const std::vector<std::string> outputs = outputNames(options);
+    // A single picture tells its phases, many how far they are.
+    const bool is_series = !options.path.empty();
+    size_t done = 0;
     FrameRequest request;
     request.settings = effectiveSettings(options, scene);
-    request.camera = chooseCamera(scene, options.camera);
     request.transparent = options.transparent;
     request.aovs = options.aovs;
     request.debug_pixel = options.debug_pixel;
     request.cancel = &cancel;
     request.progress = [&](const char* phase, double fraction) {
-        progress.update(phase, fraction);
+        if (!is_series) return progress.update(phase, fraction);
+        const std::string_view name = phase;
+        const double part = name == "draw" ? fraction : name == "write" ? 1.0 : 0.0;
+        progress.update("pictures", (double(done) + part) / double(outputs.size()));
     };
     if (!options.debug_pixel.empty()) checkDebugPixel(options.debug_pixel, request.settings);
     stats.settings = request.settings;
-    stats.camera = request.camera.name;
+    stats.camera = cameras.front().name;
     stats.scene = sceneSize(scene);
     stats.warnings = diagnostics.warnings;
 
@@ -204,22 +269,26 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
     ThreadPool pool(request.settings.threads);
     Renderer renderer(scene, pool);
     stats.build_seconds = build_watch.seconds();
-    Frame frame;
-    for (int i = 0; i < options.repeat; ++i) {
-        frame = renderer.render(request);
-        stats.frames.push_back(frame.stats);
-        throwIfCancelled(cancel);
+    for (; done < outputs.size(); ++done) {
+        request.camera = cameras[done];
+        Frame frame;
+        for (int i = 0; i < options.repeat; ++i) {
+            frame = renderer.render(request);
+            stats.frames.push_back(frame.stats);
+            throwIfCancelled(cancel);
+        }
+        if (!frame.stats.debug_text.empty())
+            std::fprintf(stderr, "%s\n", frame.stats.debug_text.c_str());
+        request.progress("write", 0.0);
+        const Stopwatch write_watch;
+        saveImage(frame.image, outputs[done], imageMetadata(stats, outputs[done]));
+        stats.write_seconds += write_watch.seconds();
+        if (is_series)
+            std::cout << outputs[done] << std::endl;  // now: others may be waiting for it
     }
-    if (!frame.stats.debug_text.empty())
-        std::fprintf(stderr, "%s\n", frame.stats.debug_text.c_str());
-
-    progress.update("write", 0.0);
-    const Stopwatch write_watch;
-    saveImage(frame.image, options.output, imageMetadata(stats, options.output));
-    stats.write_seconds = write_watch.seconds();
     if (!options.stats.empty()) saveFile(options.stats, statsJson(stats));
     progress.finish();
-    std::cout << options.output << "\n";
+    if (!is_series) std::cout << options.output << "\n";
     return ExitCode::kDone;
 }
 

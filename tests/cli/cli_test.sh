@@ -224,6 +224,64 @@ case_debug_pixel_outside() {
     grep -q '16' stderr.txt || fail "nothing about the pixel"
 }
 
+# Two keys on a circle about the ball.
+path='"paths": [ { "name": "turn", "keys": [ { "eye": [0, 0, 3], "target": [0, 0, 0], "fov": 40 },
+                                              { "eye": [3, 0, 0], "target": [0, 0, 0], "fov": 60 } ] } ],'
+
+case_path_options() {
+    write_scene "$path"
+    expect_error 2 '--path: needs --frames' render scene.scene.json -o a%d.png --path turn
+    expect_error 2 '--frames: needs --path' render scene.scene.json -o a.png --frames 3
+    expect_error 2 '--frames' render scene.scene.json -o a%d.png --path turn --frames 0
+    expect_error 2 '-o: .*needs one place' render scene.scene.json -o a.png --path turn --frames 3
+    expect_error 2 '-o: .*needs one place' render scene.scene.json -o a%d-%d.png --path turn --frames 3
+    expect_error 2 '-o: .*neither' render scene.scene.json -o a%s.png --path turn --frames 3
+    expect_error 2 '-o: .*neither' render scene.scene.json -o a%04ld.png --path turn --frames 3
+    expect_error 2 'contradicts --camera' render scene.scene.json -o a%d.png --path turn --frames 3 --camera top
+    expect_error 2 'contradicts --repeat' render scene.scene.json -o a%d.png --path turn --frames 3 --repeat 2
+    expect_error 2 "--path: there is no 'trun'; .*turn" render scene.scene.json -o a%d.png --path trun --frames 3
+    mkdir a1.png
+    expect_error 1 'a1\.png: .*not a regular file' render scene.scene.json -o a%d.png --path turn --frames 3
+    expect_no_file 'a0.png'
+    write_scene '"paths": [ { "name": "still", "keys": [ { "eye": [0, 0, 3], "target": [0, 0, 0] } ] } ],'
+    expect_error 3 '/paths/0/keys' info scene.scene.json
+}
+
+case_path_pictures() {
+    write_scene "$path"
+    expect_ok info scene.scene.json
+    expect_stdout '^paths +1: turn$'
+    for method in points raycast; do
+        expect_ok render scene.scene.json -o "100%%_%03d.png" "${tiny[@]}" --method $method \
+            --path turn --frames 3 --stats a.json
+        [[ $(cat stdout.txt) == $'100%_000.png\n100%_001.png\n100%_002.png' ]] || fail "not the pictures' paths"
+        [[ $(tr -d ' \n' <a.json | grep -oE '"frames":\[[^]]*' | tr ',' '\n' | wc -l) == 3 ]] || fail "not 3 frames"
+        grep -qE '^pictures: [0-9.]+ s$' stderr.txt || fail "no progress"
+        # The ends are the pictures of cameras that stand there, for any state of the caches.
+        write_scene "${path} \"exposure\": 0,"
+        sed -i 's/"eye": \[0, 0, 3\], "target": \[0, 0, 0\] }/"eye": [0, 0, 3], "target": [0, 0, 0], "fov": 40 }/
+                s/"eye": \[0, 3, 0.1\], "target": \[0, 0, 0\] }/"eye": [3, 0, 0], "target": [0, 0, 0], "fov": 60 }/' scene.scene.json
+        expect_ok render scene.scene.json -o front.png "${tiny[@]}" --method $method --camera front
+        expect_ok render scene.scene.json -o top.png "${tiny[@]}" --method $method --camera top
+        cmp front.png 100%_000.png || fail "the first picture is another, $method"
+        cmp top.png 100%_002.png || fail "the last picture is another, $method"
+        cmp -s 100%_001.png 100%_000.png && fail "nothing moves"
+    done
+    expect_ok render scene.scene.json -o one%d.png "${tiny[@]}" --path turn --frames 1
+    cmp one0.png 100%_000.png && fail "points and rays are the same bits"
+    "$stipple" render scene.scene.json -o a%d.png --width 200 --height 150 --path turn --frames 1000000 >stdout.txt 2>stderr.txt &
+    local pid=$!
+    wait_for_handler $pid
+    while [[ ! -e a1.png ]]; do sleep 0.05; done
+    kill -TERM $pid
+    wait $pid
+    code=$?
+    [[ $code == 6 ]] || fail "exit code $code"
+    expect_no_file '*tmp*'
+    while read -r picture; do "$stipple" compare "$picture" a0.png >/dev/null || fail "$picture is not whole"; done \
+        < <(head -n 2 stdout.txt; tail -n 1 stdout.txt)
+}
+
 case_memory_limit() {
     "$stipple" generate terrain --count 2000000 -o terrain.glb >/dev/null || fail "cannot generate"
     expect_error 1 'terrain\.glb' info terrain.glb --memory-limit 20

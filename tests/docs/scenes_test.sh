@@ -20,7 +20,14 @@ for scene in *.scene.json; do
     echo "$scene"
     "$stipple" render "$scene" -o "${scene%.scene.json}.png" --width 64 --height 36 --quiet >/dev/null
     count=$((count + 1))
+    grep -q '"paths"' "$scene" || continue
+    "$stipple" info "$scene" | sed -nE 's/^paths +[0-9]+: //p' | tr -d ',' | tr ' ' '\n' | while read -r path; do
+        "$stipple" render "$scene" --path "$path" --frames 2 -o "$path%d.png" --width 64 --height 36 --quiet >/dev/null
+        paths=$(find . -name "$path?.png" | wc -l)
+        [[ $paths == 2 ]] || { echo "$scene: path $path: $paths pictures"; exit 1; }
+    done
 done
+[[ -f flight1.png ]] || { echo "no path was drawn"; exit 1; }
 [[ $count -ge 6 ]] || { echo "only $count scene files found"; exit 1; }
 
 grep -oE 'images/scenes-[a-z0-9-]+\.jpg' "$docs/scenes.md" | while read -r picture; do

@@ -242,6 +242,134 @@ TEST(IoSceneFile, countsHowOftenEachMeshIsShown) {
     EXPECT_EQ(meshInstances(loaded.scene), (std::vector<double>{21.0, 0.0}));
 }
 
+TEST(IoSceneFile, lakesKeepTheirOwnRipples) {
+    Json s = minimal();
+    for (const char* name : {"lake_1", "lake_2"}) {
+        s["assets"][name] = Json::parse(
+            R"({"generate": "terrain", "resolution": 33, "relief": 50, "water_level": 20})");
+        s["assets"][name]["seed"] = name[5] - '0';
+    }
+    const Scene scene = loadChecked(s).scene;
+    ASSERT_EQ(scene.textures.size(), 2u);
+    EXPECT_NE(scene.textures[0].levels[0].rgba, scene.textures[1].levels[0].rgba);
+    std::vector<int> maps;
+    for (const Material& m : scene.materials) {
+        if (m.name == "water") maps.push_back(m.normal_map.texture);
+    }
+    EXPECT_EQ(maps, (std::vector<int>{0, 1}));
+}
+
+TEST(IoSceneFile, aGroupMayHaveSeveralScatterRules) {
+    Json s = minimal();
+    const Json few = Json::parse(
+                   R"({"items": [{"child": "ball"}], "count": 7, "size": 10, "seed": 1})"),
+               more = Json::parse(
+                   R"({"items": [{"child": "ball"}], "count": 5, "size": 90, "seed": 2})");
+    const auto instances = [&](const Json& rules) {
+        s["groups"]["all"] = {{"scatter", rules}};
+        std::vector<DVec3> places;
+        const Scene scene = loadChecked(s).scene;
+        const InstanceStore& store = scene.groups[scene.root].instances;
+        for (size_t i = 0; i < store.size(); ++i)
+            places.push_back(store.groupFromChild(i).translation);
+        return places;
+    };
+    // The same places as each rule alone.
+    std::vector<DVec3> both = instances({few, more}), apart = instances(few);
+    for (const DVec3& p : instances(Json::array({more}))) apart.push_back(p);
+    ASSERT_GT(both.size(), 6u);
+    ASSERT_EQ(both.size(), apart.size());
+    const auto lessX = [](const DVec3& a, const DVec3& b) { return a.x < b.x; };
+    std::sort(both.begin(), both.end(), lessX);
+    std::sort(apart.begin(), apart.end(), lessX);
+    for (size_t i = 0; i < both.size(); ++i) EXPECT_LT(glm::length(both[i] - apart[i]), 1e-4);
+
+    const auto error = [&](const Json& rules) {
+        s["groups"]["all"] = {{"scatter", rules}};
+        const TempFolder folder;
+        return tryLoad(folder.write("s.scene.json", s.dump())).error;
+    };
+    Json wrong = few;
+    wrong["items"][0]["child"] = "bell";
+    EXPECT_NE(error({few, wrong}).find("/groups/all/scatter/1/items/0/child: "), std::string::npos)
+        << error({few, wrong});
+    wrong = few;
+    wrong["count"] = -1;
+    EXPECT_NE(error({few, wrong}).find("/groups/all/scatter/1/count: "), std::string::npos);
+    EXPECT_NE(error(Json::array()).find("/groups/all/scatter: "), std::string::npos);
+}
+
+TEST(IoSceneFile, readsPaths) {
+    Json s = minimal();
+    s["paths"] = Json::parse(R"([
+        {"name": "walk", "up": [0, 0, 2], "near": 1, "far": 50, "keys": [
+            {"eye": [0, 0, 0], "target": [9, 0, 0], "fov": 60}, {"eye": [0, 3, 4], "target": [9, 0, 0]},
+            {"eye": [0, 3, 6], "target": [9, 1, 0], "fov": 30}]},
+        {"name": "turn", "keys": [{"eye": [1, 2, 3], "direction": [0, 0, -5], "time": -2},
+                                  {"eye": [1, 2, 3], "direction": [4, 0, 0], "time": 8}]}])");
+    const Loaded loaded = loadChecked(s);
+    ASSERT_EQ(loaded.scene.paths.size(), 2u);
+    const CameraPath& walk = *loaded.scene.findPath("walk");
+    EXPECT_EQ(walk.up, DVec3(0, 0, 1));
+    EXPECT_EQ(walk.near_z, 1.0);
+    EXPECT_EQ(walk.far_z, 50.0);
+    ASSERT_EQ(walk.keys.size(), 3u);
+    EXPECT_FALSE(walk.aims_are_directions);
+    const double times[] = {0.0, 5.0, 7.0};  // the lengths of the way
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(walk.keys[i].time, times[i], 1e-12);
+    EXPECT_EQ(walk.keys[2].aim, DVec3(9, 1, 0));
+    EXPECT_NEAR(walk.keys[1].fov_y, kPi / 3, 1e-12);  // of the key before
+    EXPECT_NEAR(walk.keys[2].fov_y, kPi / 6, 1e-12);
+    const CameraPath& turn = *loaded.scene.findPath("turn");
+    EXPECT_TRUE(turn.aims_are_directions);
+    EXPECT_EQ(turn.keys[1].time, 8.0);
+    EXPECT_EQ(turn.keys[1].aim, DVec3(1, 0, 0));
+    EXPECT_EQ(loaded.scene.findPath("run"), nullptr);
+}
+
+TEST(IoSceneFile, namesWhatIsWrongWithPaths) {
+    const auto error = [](const std::string& paths) {
+        Json s = minimal();
+        s["paths"] = Json::parse(paths);
+        const TempFolder folder;
+        return tryLoad(folder.write("s.scene.json", s.dump())).error;
+    };
+    const std::string one = R"({"eye": [0, 0, 0], "target": [0, 0, 1]})";
+    const std::pair<std::string, const char*> cases[] = {
+        {R"([{"name": "a", "keys": []}])", "/paths/0/keys: "},
+        {R"([{"name": "a", "keys": [)" + one + "]}]", "/paths/0/keys: "},
+        {R"([{"keys": [)" + one + "," + one + "]}]", "/paths/0: "},
+        {R"([{"name": "a", "keys": [)" + one + "," + one + "]}]",
+         "/paths/0/keys/1: the eye is where it was before"},
+        {R"([{"name": "a", "keys": [)" + one + R"(, {"eye": [0, 0, 2]}]}])",
+         "/paths/0/keys/1: needs target or direction"},
+        {R"([{"name": "a", "keys": [)" + one + R"(, {"eye": [0, 0, 2], "target": [0, 0, 2]}]}])",
+         "/paths/0/keys/1/target: the vector is zero"},
+        {R"([{"name": "a", "keys": [)" + one + R"(, {"eye": [0, 0, 2], "direction": [0, 0, 1]}]}])",
+         "/paths/0/keys/1: some keys have target and some direction"},
+        {R"([{"name": "a", "keys": [)" + one +
+             R"(, {"eye": [0, 0, 2], "target": [0, 0, 1], "time": 3}]}])",
+         "/paths/0/keys/1: has a time and others have not"},
+        {R"([{"name": "a", "keys": [{"eye": [0, 0, 1], "target": [0, 0, 2], "time": 3},
+             {"eye": [0, 0, 0], "target": [0, 0, 1], "time": 3}]}])",
+         "/paths/0/keys/1/time: is not later"},
+        {R"([{"name": "a", "keys": [)" + one +
+             R"(, {"eye": [0, 0, 2], "target": [0, 0, 1], "fov": 200}]}])",
+         "/paths/0/keys/1/fov: "},
+        {R"([{"name": "a", "near": 5, "far": 4, "keys": [)" + one +
+             R"(, {"eye": [0, 0, 2], "target": [0, 0, 1]}]}])",
+         "/paths/0: near is not less"},
+        {R"([{"name": "a", "keys": [)" + one + R"(, {"eye": [0, 0, 2], "target": [0, 0, 1]}]},
+            {"name": "a", "keys": [)" +
+             one + R"(, {"eye": [0, 0, 2], "target": [0, 0, 1]}]}])",
+         "/paths/1: a path before has the name \"a\" too"}};
+    for (const auto& [paths, expected] : cases) {
+        EXPECT_NE(error(paths).find(expected), std::string::npos) << paths << "\n"
+                                                                  << error(paths) << "\n"
+                                                                  << expected;
+    }
+}
+
 // One change that makes the scene wrong, as a JSON merge patch, and how the error begins and what
 // it says.
 struct Wrong {

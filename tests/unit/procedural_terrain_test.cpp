@@ -162,7 +162,87 @@ TEST(ProceduralTerrain, waterCoversWhatIsBelowIt) {
     }
     EXPECT_GT(wet, 50u);
     EXPECT_EQ(covered, 2 * wet);
-    EXPECT_EQ(makeTerrain({.water_level = 0.0}, makeHeightField({})).materials.size(), 1u);
+    const GeneratedMesh dry = makeTerrain({.water_level = 0.0}, makeHeightField({}));
+    EXPECT_EQ(dry.materials.size(), 1u);
+    EXPECT_TRUE(dry.textures.empty());
+    EXPECT_TRUE(dry.mesh.uvs.empty());
+}
+
+// What samples are too far apart to show would be noise from vertex to vertex, drawn out along the
+// triangles' edges: neighbours would differ as much as places far from each other.
+TEST(ProceduralTerrain, coloursHoldNothingFinerThanTheSamples) {
+    for (const double step : {4.0, 9.0, 40.0}) {
+        HeightField field;
+        field.columns = field.rows = 65;
+        field.size = DVec2(64.0 * step);
+        field.heights.assign(65 * 65, 0.0f);
+        const GeneratedMesh terrain = makeTerrain({.style = "meadow"}, field);
+        const auto difference = [&](int apart) {
+            double sum = 0.0;
+            for (int j = 0; j < 65; ++j) {
+                for (int i = 0; i + apart < 65; ++i) {
+                    const size_t v = size_t(j * 65 + i);
+                    sum += std::abs(terrain.mesh.colors[v].y -
+                                    terrain.mesh.colors[v + size_t(apart)].y);
+                }
+            }
+            return sum / (65.0 * (65.0 - apart));
+        };
+        EXPECT_GT(difference(12), 1e-4) << step;
+        EXPECT_LT(difference(1), 0.65 * difference(12)) << step;
+    }
+}
+
+TEST(ProceduralTerrain, mountainsErodeWithinTheirRelief) {
+    const TerrainParams params{.seed = 3,
+                               .size = 4000.0,
+                               .resolution = 257,
+                               .relief = 800.0,
+                               .feature_size = 2000.0,
+                               .style = "mountain",
+                               .erosion = 0.7,
+                               .water_level = 60.0};
+    const HeightField field = makeHeightField(params);
+    const auto [low, high] = std::minmax_element(field.heights.begin(), field.heights.end());
+    EXPECT_GE(*low, 0.0f);
+    EXPECT_LE(*high, 800.01f);
+    EXPECT_GT(*high, 770.0f);  // summits stay
+    EXPECT_EQ(field.heights, makeHeightField(params).heights);
+}
+
+// The map repeats without a seam, leans no way as a whole, and is about as steep as wind makes it.
+TEST(ProceduralTerrain, ripplesAreATileableNormalMap) {
+    const TerrainParams params{.resolution = 65, .relief = 60.0, .water_level = 20.0};
+    const GeneratedMesh terrain = makeTerrain(params, makeHeightField(params));
+    ASSERT_EQ(terrain.textures.size(), 1u);
+    EXPECT_EQ(terrain.mesh.uvs.size(), terrain.mesh.positions.size());
+    EXPECT_EQ(terrain.materials[0].normal_map.texture, kNoTexture);
+    EXPECT_EQ(terrain.materials[1].normal_map.texture, 0);
+    const Texture& map = terrain.textures[0];
+    const Texture::Level& level = map.levels[0];
+    const double scale = double(terrain.materials[1].normal_scale);
+    const auto slope = [&](int x, int y, int c) {
+        return scale * (level.rgba[size_t((y * level.width + x) * 4 + c)] / 127.5 - 1.0);
+    };
+    double sum2 = 0.0, seam = 0.0, inside = 0.0;
+    const int n = level.width;
+    ASSERT_EQ(level.height, n);
+    for (int i = 0; i < n; ++i) {
+        for (int k = 0; k < n; ++k) {
+            for (int c = 0; c < 2; ++c) sum2 += slope(i, k, c) * slope(i, k, c);
+        }
+        for (int c = 0; c < 2; ++c) {
+            seam += std::abs(slope(0, i, c) - slope(n - 1, i, c)) +
+                    std::abs(slope(i, 0, c) - slope(i, n - 1, c));
+            inside += std::abs(slope(n / 2, i, c) - slope(n / 2 - 1, i, c)) +
+                      std::abs(slope(i, n / 2, c) - slope(i, n / 2 - 1, c));
+        }
+    }
+    EXPECT_NEAR(std::sqrt(sum2 / double(n * n)), 0.09, 0.01);
+    EXPECT_LT(seam, 1.5 * inside);
+    const Texture::Level& mean = map.levels.back();
+    ASSERT_EQ(mean.width, 1);
+    for (int c = 0; c < 2; ++c) EXPECT_NEAR(mean.rgba[size_t(c)], 127.5, 3.0);
 }
 
 TEST(ProceduralTerrain, flatReliefStaysFinite) {
