@@ -112,6 +112,7 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
         for (int pass = 0; pass < reconstruction.passCount(); ++pass) {
             reconstruction.beginPass(pass, lookup);
             for (const uint32_t b : tile.batches) {
+                if (request.cancel && request.cancel->requested) return;
                 if (reconstruction.hides(batches[b].rect, batches[b].z_min, false)) {
                     worker.culled += pass == 0 ? uint64_t(batches[b].expected_points) : 0;
                 } else {
