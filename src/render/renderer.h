@@ -26,8 +26,9 @@ struct FrameStats {
     double seconds = 0.0;       // from view to shaded picture
     uint64_t points_drawn = 0;  // emitted, once for each tile whose halo their node reaches; rays
     uint64_t points_kept = 0;   // of these: after thinning, within the tile proper; rays
-    uint64_t points_culled =
-        0;  // expected in batches that tiles skipped as hidden, by shares of area
+    // Expected in batches that tiles skipped as hidden, by the share of their rectangle in the
+    // tile.
+    uint64_t points_culled = 0;
     uint64_t batches = 0;
     uint64_t large_triangles = 0;  // given to the z-buffer
     uint64_t small_triangles = 0;  // rasterized in tiles
