@@ -28,15 +28,23 @@ int ThreadPool::threadCount() const { return impl_->n_threads; }
 
 void ThreadPool::forEach(size_t count, const std::function<void(size_t, int)>& body) {
     // One task a thread and a shared counter: indices go out in ascending order and `thread` is
-    // exclusive to a task.
+    // exclusive to a task. TBB only keeps tasks from starting after an exception; those that run
+    // look at has_failed.
     std::atomic<size_t> next{0};
+    std::atomic<bool> has_failed{false};
     const size_t tasks = std::min(count, size_t(impl_->n_threads));
     impl_->arena.execute([&] {
         tbb::parallel_for(
             size_t(0), tasks,
             [&](size_t thread) {
-                for (size_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < count;)
-                    body(i, int(thread));
+                try {
+                    for (size_t i; !has_failed.load(std::memory_order_relaxed) &&
+                                   (i = next.fetch_add(1, std::memory_order_relaxed)) < count;)
+                        body(i, int(thread));
+                } catch (...) {
+                    has_failed = true;
+                    throw;
+                }
             },
             tbb::simple_partitioner());
     });

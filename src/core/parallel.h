@@ -25,8 +25,8 @@ public:
 
     int threadCount() const;
     // Calls body(index, thread) for every index in [0, count), thread in [0, threadCount()),
-    // indices handed out in ascending order. The first exception is rethrown on the caller when all
-    // threads have stopped.
+    // indices handed out in ascending order. After an exception no more are handed out; the first
+    // is rethrown on the caller when all threads have stopped.
     void forEach(size_t count, const std::function<void(size_t index, int thread)>& body);
 
 private:

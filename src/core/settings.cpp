@@ -103,7 +103,7 @@ std::vector<Entry> makeEntries() {
                        "the reference"),
         number("samples", &S::samples, 0.001, 10000.0, "",
                "K, expected points per subpixel of exactly projected area; with raycast, rays a "
-               "pixel"),
+               "pixel: jittered, a single one through its centre"),
         number("subpixels", &S::subpixels, 1, 16, "subpixels",
                "subpixels along one side of a pixel"),
         choice<Sampler>("sampler", &S::sampler,

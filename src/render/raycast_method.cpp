@@ -5,6 +5,7 @@
 #include <core/stopwatch.h>
 #include <reconstruct/shade.h>
 
+#include <array>
 #include <mutex>
 
 namespace stipple {
@@ -12,6 +13,7 @@ namespace stipple {
 namespace {
 
 constexpr int kTilePixels = 16;
+constexpr int kLargestBlock = 4;
 constexpr size_t kBatchRays = 256;
 
 // Rays that are cast together, in an order in which neighbours are coherent.
@@ -22,7 +24,8 @@ struct RayBatch {
 };
 
 // Offset of ray i of n in the pixel, in [0,1)^2: jittered in the cells of the squarest grid that n
-// fills, over which what is left is random.
+// fills, over which what is left is random. A single ray goes through the centre: at a straight
+// edge it sees what covers most of the pixel, with half the mean squared error of a random one.
 Vec2 pixelOffset(int i, int n, uint64_t pixel_key) {
     if (n == 1) return Vec2(0.5f);
     const int side = int(std::sqrt(double(n)) + 1e-9);
@@ -82,18 +85,24 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
                   y1 = std::min(y0 + kTilePixels, view.height);
         // Blocks of as few pixels as fill a packet with all their rays: rays that follow each other
         // go through the same nodes.
-        const int side = n_rays >= 16 ? 1 : n_rays >= 4 ? 2 : 4;
+        const int side = n_rays >= 16 ? 1 : n_rays >= 4 ? 2 : kLargestBlock;
         std::vector<PixelSums> sums(kTilePixels * kTilePixels);
         RayBatch batch;
+        std::array<uint64_t, kLargestBlock * kLargestBlock> pixel_keys;
         for (int by = y0; by < y1; by += side) {
             for (int bx = x0; bx < x1; bx += side) {
                 const int ex = std::min(bx + side, x1), ey = std::min(by + side, y1);
+                const auto keyOf = [&](int x, int y) -> uint64_t& {
+                    return pixel_keys[size_t((y - by) * kLargestBlock + (x - bx))];
+                };
+                for (int y = by; y < ey; ++y) {
+                    for (int x = bx; x < ex; ++x)
+                        keyOf(x, y) = hashCombine(request.settings.seed, uint64_t(x), uint64_t(y));
+                }
                 for (int i = 0; i < n_rays; ++i) {
                     for (int y = by; y < ey; ++y) {
                         for (int x = bx; x < ex; ++x) {
-                            const Vec2 o = pixelOffset(
-                                i, n_rays,
-                                hashCombine(request.settings.seed, uint64_t(x), uint64_t(y)));
+                            const Vec2 o = pixelOffset(i, n_rays, keyOf(x, y));
                             Vec3 origin, direction;
                             view.ray((float(x) + o.x) * s, (float(y) + o.y) * s, origin, direction);
                             batch.rays.push_back({world_from_camera * origin, view.near_z,

@@ -20,17 +20,19 @@ namespace stipple {
 inline constexpr double kZBufferLimit = 1e9;
 
 struct FrameStats {
-    // In order; names as in the --stats contract: build, plan, raster, draw, reconstruct, shade
-    // (seconds of wall time).
+    // As they came, seconds: build, plan, raster and, as means of the threads' times, draw and
+    // reconstruct, which shading is part of; with raycast build and draw, which shading is part of.
     std::vector<std::pair<std::string, double>> phases;
-    double seconds = 0.0;        // from view to shaded picture
-    uint64_t points_drawn = 0;   // emitted by the sources
-    uint64_t points_kept = 0;    // after thinning, within the picture
-    uint64_t points_culled = 0;  // in batches that were skipped as hidden
+    double seconds = 0.0;       // from view to shaded picture
+    uint64_t points_drawn = 0;  // emitted, once for each tile whose halo their node reaches; rays
+    uint64_t points_kept = 0;   // of these: after thinning, within the tile proper; rays
+    // Expected in batches that tiles skipped as hidden, by the share of their rectangle in the
+    // tile.
+    uint64_t points_culled = 0;
     uint64_t batches = 0;
     uint64_t large_triangles = 0;  // given to the z-buffer
     uint64_t small_triangles = 0;  // rasterized in tiles
-    double overestimation = 0.0;   // points drawn in the frustum / points needed
+    double overestimation = 0.0;   // points_drawn / points_kept; 0 without points
     size_t cache_bytes = 0;        // of the point lists
     std::string debug_text;        // one line on the pixel asked for
 };

@@ -4,7 +4,9 @@
 #include <core/stopwatch.h>
 
 #include <algorithm>
+#include <cmath>
 #include <mutex>
+#include <numeric>
 
 namespace stipple {
 
@@ -58,6 +60,16 @@ void sortIntoTiles(const std::vector<Batch>& batches, const View& view, int tile
     }
 }
 
+// The points of a batch that are expected in a tile proper, as if they lay evenly in its rectangle.
+double expectedPoints(const Batch& batch, const SubpixelRect& inner) {
+    const SubpixelRect& r = batch.rect;
+    const SubpixelRect common = {std::max(r.x0, inner.x0), std::max(r.y0, inner.y0),
+                                 std::min(r.x1, inner.x1), std::min(r.y1, inner.y1)};
+    if (common.isEmpty()) return 0.0;
+    return double(batch.expected_points) * (double(common.width()) * common.height()) /
+           (double(r.width()) * r.height());
+}
+
 class NumberLookup : public SampleLookup {
 public:
     NumberLookup(const TileEmitter* emitter, const TriangleLookup& triangles)
@@ -80,7 +92,6 @@ struct Worker {
     std::unique_ptr<TileEmitter> emitter;
     std::unique_ptr<TileReconstruction> reconstruction;
     double draw_seconds = 0.0, finish_seconds = 0.0;
-    uint64_t culled = 0;
 };
 
 }  // namespace
@@ -94,6 +105,7 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
 
     if (request.progress) request.progress("draw", 0.0);
     std::vector<Worker> workers(pool.threadCount());
+    std::vector<double> culled(tiles.size());  // not by worker: the same sum for any threads
     std::atomic<size_t> done{0};
     std::mutex progress_mutex;
     pool.forEach(tiles.size(), [&](size_t t, int thread) {
@@ -112,8 +124,9 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
         for (int pass = 0; pass < reconstruction.passCount(); ++pass) {
             reconstruction.beginPass(pass, lookup);
             for (const uint32_t b : tile.batches) {
+                if (request.cancel && request.cancel->requested) return;
                 if (reconstruction.hides(batches[b].rect, batches[b].z_min, false)) {
-                    worker.culled += pass == 0 ? uint64_t(batches[b].expected_points) : 0;
+                    if (pass == 0) culled[t] += expectedPoints(batches[b], tile.inner);
                 } else {
                     worker.emitter->emit(batches[b], reconstruction);
                 }
@@ -140,11 +153,12 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
         const TileCounters counters = worker.reconstruction->counters();
         stats.points_drawn += counters.points_drawn;
         stats.points_kept += counters.points_kept;
-        stats.points_culled += worker.culled;
         stats.small_triangles += counters.triangles;
         draw += worker.draw_seconds;
         finish += worker.finish_seconds;
     }
+    stats.points_culled +=
+        uint64_t(std::llround(std::accumulate(culled.begin(), culled.end(), 0.0)));
     stats.batches = batches.size();
     stats.phases.emplace_back("draw", draw / pool.threadCount());
     stats.phases.emplace_back("reconstruct", finish / pool.threadCount());

@@ -16,7 +16,8 @@ using TriangleLookup =
 
 // Draws all batches of `source` (nullptr: none) into context.picture. Tiles in which nothing
 // changes what another tile shows; the same bits for any number of threads. Adds counters and the
-// times of drawing, reconstructing and shading to stats.
+// phases "draw" (passes over the points) and "reconstruct" (filling, look-ups, shading, writing) to
+// stats, each the mean of the threads' times.
 void drawTiles(const ReconstructionContext& context, PointSource* source,
                const std::vector<Batch>& batches, const TriangleLookup& triangle_lookup,
                ThreadPool& pool, const FrameRequest& request, FrameStats& stats);

@@ -33,7 +33,7 @@ struct BenchOptions {
 // A method with settings that reach a quality.
 struct BenchRun {
     RenderSettings settings;
-    bool is_reached = true;       // false: the best there was, below the quality
+    bool is_reached = true;       // false: the best there was, below the quality; no ratios
     CompareResult quality;        // against the reference
     double still_seconds = 0.0;   // a frame like the one before, from caches
     double moving_seconds = 0.0;  // a frame after the camera has moved; without rebuilding for rays
@@ -42,11 +42,12 @@ struct BenchRun {
 
 // A process of its own that loads, builds and draws one frame.
 struct ColdStart {
-    double load_seconds = 0.0;
-    double build_seconds = 0.0;
+    double load_seconds = 0.0;   // the file, and the groups' octrees, which points need
+    double build_seconds = 0.0;  // Embree's scene, which rays need
     double frame_seconds = 0.0;
+    double picture_seconds = 0.0;  // build and frame
+    double total_seconds = 0.0;    // load, build and frame
     uint64_t peak_bytes = 0;
-    double pictureSeconds() const { return build_seconds + frame_seconds; }
 };
 
 struct BenchMethod {

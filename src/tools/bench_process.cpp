@@ -106,6 +106,8 @@ ColdStart runColdStart(const BenchOptions& options, const std::string& camera,
         if (phase.at("name") == "build") cold.build_seconds = phase.at("seconds");
     }
     cold.frame_seconds = stats.at("frames").at(0);
+    cold.picture_seconds = cold.build_seconds + cold.frame_seconds;
+    cold.total_seconds = cold.load_seconds + cold.picture_seconds;
     cold.peak_bytes = stats.at("memory").at("peak_bytes");
     return cold;
 }

@@ -3,6 +3,7 @@
 #include <tools/bench.h>
 #include <tools/json_number.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdarg>
 #include <cstdio>
@@ -83,7 +84,7 @@ void appendQuality(std::string& text, const CameraBench& camera, size_t q) {
                run.quality.psnr, run.quality.flip,
                run.quality.holes ? 100.0 * run.quality.holes->fraction : 0.0, run.still_seconds,
                run.moving_seconds);
-        if (method.method != Method::kPoints) {
+        if (method.method != Method::kPoints && points.is_reached) {
             append(text, "  %.2fx still, %.2fx moving", run.still_seconds / points.still_seconds,
                    run.moving_seconds / points.moving_seconds);
         }
@@ -92,8 +93,15 @@ void appendQuality(std::string& text, const CameraBench& camera, size_t q) {
 }
 
 Json settingsJson(const RenderSettings& s) {
-    return {
-        {"samples", s.samples}, {"subpixels", s.subpixels}, {"area_threshold", s.area_threshold}};
+    return {{"samples", s.samples},
+            {"subpixels", s.subpixels},
+            {"area_threshold", s.area_threshold},
+            {"seed", s.seed}};
+}
+
+// Times compare at equal quality only.
+Json ratioJson(double seconds, double points_seconds, const BenchRun& points) {
+    return points.is_reached ? Json(seconds / points_seconds) : Json(nullptr);
 }
 
 // JSON has no infinity: a picture that equals the reference has no PSNR.
@@ -108,8 +116,8 @@ Json runJson(const BenchRun& run, const BenchRun& points, int rays) {
                  {"holes", run.quality.holes ? Json(run.quality.holes->fraction) : Json(nullptr)},
                  {"still_seconds", run.still_seconds},
                  {"moving_seconds", run.moving_seconds},
-                 {"still_ratio", run.still_seconds / points.still_seconds},
-                 {"moving_ratio", run.moving_seconds / points.moving_seconds},
+                 {"still_ratio", ratioJson(run.still_seconds, points.still_seconds, points)},
+                 {"moving_ratio", ratioJson(run.moving_seconds, points.moving_seconds, points)},
                  {"points_drawn", run.stats.points_drawn}};
     json["phases"] = Json::array();
     for (const auto& [name, seconds] : run.stats.phases)
@@ -124,17 +132,22 @@ Json cameraJson(const CameraBench& camera, const BenchResult& result) {
                    {"path", camera.reference_path},
                    {"cached", camera.is_reference_cached}}}};
     const BenchMethod& points = *findMethod(camera, Method::kPoints);
+    const BenchRun& first = points.runs[kFirstPictureQuality];
     json["methods"] = Json::array();
     for (const BenchMethod& method : camera.methods) {
-        Json m = {{"method", methodName(method.method)},
-                  {"first_picture",
-                   {{"rays", kQualityRays[kFirstPictureQuality]},
-                    {"load_seconds", method.cold.load_seconds},
-                    {"build_seconds", method.cold.build_seconds},
-                    {"frame_seconds", method.cold.frame_seconds},
-                    {"picture_seconds", method.cold.pictureSeconds()},
-                    {"ratio", method.cold.pictureSeconds() / points.cold.pictureSeconds()},
-                    {"peak_bytes", method.cold.peak_bytes}}}};
+        Json m = {
+            {"method", methodName(method.method)},
+            {"first_picture",
+             {{"rays", kQualityRays[kFirstPictureQuality]},
+              {"load_seconds", method.cold.load_seconds},
+              {"build_seconds", method.cold.build_seconds},
+              {"frame_seconds", method.cold.frame_seconds},
+              {"picture_seconds", method.cold.picture_seconds},
+              {"total_seconds", method.cold.total_seconds},
+              {"ratio", ratioJson(method.cold.picture_seconds, points.cold.picture_seconds, first)},
+              {"total_ratio",
+               ratioJson(method.cold.total_seconds, points.cold.total_seconds, first)},
+              {"peak_bytes", method.cold.peak_bytes}}}};
         m["qualities"] = Json::array();
         for (size_t q = 0; q < kQualityRays.size(); ++q)
             m["qualities"].push_back(runJson(method.runs[q], points.runs[q], kQualityRays[q]));
@@ -160,6 +173,13 @@ Json cameraJson(const CameraBench& camera, const BenchResult& result) {
 
 }  // namespace
 
+double median(std::vector<double> values) {
+    const size_t middle = values.size() / 2;
+    std::nth_element(values.begin(), values.begin() + middle, values.end());
+    if (values.size() % 2 == 1) return values[middle];
+    return 0.5 * (values[middle] + *std::max_element(values.begin(), values.begin() + middle));
+}
+
 std::string benchHeading(const BenchResult& result) {
     std::string text;
     append(text, "%s: %.4g instances, %.4g triangles; %d x %d, %d threads, medians of %d\n",
@@ -177,16 +197,20 @@ std::string cameraTable(const CameraBench& camera, const BenchResult& result) {
     const BenchMethod& points = *findMethod(camera, Method::kPoints);
     append(text, "\n  first picture, at the quality of %d rays\n",
            kQualityRays[kFirstPictureQuality]);
-    append(text, "    %-8s %8s %8s %8s %10s %9s  %s\n", "method", "load s", "build s", "frame s",
-           "picture s", "peak MB", "points are faster by");
+    append(text, "    %-8s %8s %8s %8s %10s %8s %9s  %s\n", "method", "load s", "build s",
+           "frame s", "picture s", "total s", "peak MB", "points are faster by");
     for (const BenchMethod& method : camera.methods) {
         const ColdStart& cold = method.cold;
-        append(text, "    %-8s %8.3f %8.3f %8.3f %10.3f %9.1f", methodName(method.method).c_str(),
-               cold.load_seconds, cold.build_seconds, cold.frame_seconds, cold.pictureSeconds(),
+        append(text, "    %-8s %8.3f %8.3f %8.3f %10.3f %8.3f %9.1f",
+               methodName(method.method).c_str(), cold.load_seconds, cold.build_seconds,
+               cold.frame_seconds, cold.picture_seconds, cold.total_seconds,
                double(cold.peak_bytes) / 1e6);
-        if (method.method != Method::kPoints)
-            append(text, "  %.2fx", cold.pictureSeconds() / points.cold.pictureSeconds());
-        text += "\n";
+        if (method.method != Method::kPoints && points.runs[kFirstPictureQuality].is_reached) {
+            append(text, "  %.2fx without load, %.2fx with it",
+                   cold.picture_seconds / points.cold.picture_seconds,
+                   cold.total_seconds / points.cold.total_seconds);
+        }
+        text += method.runs[kFirstPictureQuality].is_reached ? "\n" : "  (quality not reached)\n";
     }
     const PointRates rates = pointRates(camera, result.threads);
     append(text,

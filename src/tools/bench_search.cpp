@@ -23,6 +23,22 @@ const SearchStep* fastestStep(const std::vector<SearchStep>& steps, double wante
     return fastest;
 }
 
+const SearchStep* fastestConfirmedStep(
+    const std::vector<SearchStep>& steps, double wanted_db,
+    const std::function<double(const RenderSettings&)>& psnrAgain) {
+    std::vector<const SearchStep*> candidates;
+    for (const SearchStep& step : steps) {
+        if (step.psnr_db >= wanted_db) candidates.push_back(&step);
+    }
+    std::stable_sort(
+        candidates.begin(), candidates.end(),
+        [](const SearchStep* a, const SearchStep* b) { return a->seconds < b->seconds; });
+    for (const SearchStep* step : candidates) {
+        if (psnrAgain(step->settings) >= wanted_db) return step;
+    }
+    return nullptr;
+}
+
 const SearchStep& bestStep(const std::vector<SearchStep>& steps) {
     return *std::max_element(
         steps.begin(), steps.end(),
@@ -33,10 +49,11 @@ std::vector<SearchStep> searchSettings(const RenderSettings& base,
                                        const std::vector<double>& wanted_db, double limit_seconds,
                                        const TrySettings& attempt) {
     std::vector<SearchStep> steps;
+    const double most_wanted = *std::max_element(wanted_db.begin(), wanted_db.end());
     for (const int subpixels : kSubpixels) {
         // The time beyond which nothing is of use.
         const auto limit = [&] {
-            const SearchStep* reached = fastestStep(steps, wanted_db.back());
+            const SearchStep* reached = fastestStep(steps, most_wanted);
             return reached ? reached->seconds : limit_seconds;
         };
         double psnr_before = -kInfinity;

@@ -470,7 +470,7 @@ case_bench() {
     done
     grep -q '^top: reference: ' stderr.txt || fail "no progress"
     for key in schema version command scene width height threads repetitions load_seconds limit_buffer_bytes \
-        left_out cameras reference methods first_picture build_seconds frame_seconds picture_seconds peak_bytes \
+        left_out cameras reference methods first_picture build_seconds frame_seconds picture_seconds total_seconds ratio total_ratio peak_bytes \
         qualities reached settings samples subpixels area_threshold psnr_db flip holes still_seconds \
         moving_seconds still_ratio points_drawn phases cached_per_second_core fresh_per_second_core \
         limit_per_second limit_bytes_per_second limit_share rays_per_second search; do
@@ -478,6 +478,8 @@ case_bench() {
     done
     [[ $(grep -c '"method": "points"' a.json) == 2 ]] || fail "not two cameras"
     [[ $(grep -c '"method": "zbuffer"' a.json) == 2 ]] || fail "zbuffer is missing"
+    # What was tried has the seed of the command line; what was judged has another.
+    [[ $(grep -c '"seed": 2' a.json) == 6 ]] || fail "the quality was judged with the seed of the search"
     [[ $(grep -c '"still_seconds": 0.0,' a.json) == 0 ]] || fail "something was not timed"
 
     expect_ok bench scene.scene.json "${quick_bench[@]}" --camera top --against zbuffer --quiet

@@ -67,6 +67,38 @@ TEST(ToolsBenchSearch, givesUpWhereNothingIsFastEnough) {
     EXPECT_LT(total, 30u);
 }
 
+TEST(ToolsBenchSearch, theOrderOfTheQualitiesMakesNoDifference) {
+    const auto sorted = searchSettings(base(), {22.0, 28.0, 33.0}, 0.5, model);
+    const auto other = searchSettings(base(), {33.0, 22.0, 28.0}, 0.5, model);
+    for (const double wanted : {22.0, 28.0, 33.0}) {
+        ASSERT_TRUE(fastestStep(other, wanted));
+        EXPECT_EQ(fastestStep(other, wanted)->seconds, fastestStep(sorted, wanted)->seconds);
+    }
+}
+
+// Steps of equal true quality that noise lets pass or not: the fastest passed by luck.
+TEST(ToolsBenchSearch, whatPassedByLuckIsNotTaken) {
+    std::vector<SearchStep> steps(5);
+    const double seconds[] = {3.0, 1.0, 2.0, 0.5, 2.5}, found_db[] = {31, 30.1, 30.2, 29.9, 33};
+    for (int i = 0; i < 5; ++i) {
+        steps[i].settings.subpixels = i + 1;
+        steps[i].seconds = seconds[i];
+        steps[i].psnr_db = found_db[i];
+    }
+    const double again_db[] = {30.5, 29.8, 29.9, 31.0, 30.0};
+    std::vector<int> asked;
+    const auto psnrAgain = [&](const RenderSettings& settings) {
+        asked.push_back(settings.subpixels);
+        return again_db[settings.subpixels - 1];
+    };
+    EXPECT_EQ(fastestConfirmedStep(steps, 30.0, psnrAgain), &steps[4]);
+    EXPECT_EQ(asked, (std::vector<int>{2, 3, 5})) << "by their times; what failed is not asked";
+    EXPECT_EQ(fastestConfirmedStep(steps, 30.8, psnrAgain), nullptr);
+    asked.clear();
+    EXPECT_EQ(fastestConfirmedStep(steps, 40.0, psnrAgain), nullptr);
+    EXPECT_TRUE(asked.empty());
+}
+
 TEST(ToolsBenchSearch, triesNoSettingsTwice) {
     const auto steps = searchSettings(base(), {21.0, 21.5, 22.0}, 100.0, model);
     for (size_t i = 0; i < steps.size(); ++i) {
