@@ -20,7 +20,7 @@ namespace stipple {
 inline constexpr double kZBufferLimit = 1e9;
 
 struct FrameStats {
-    // In order; names as in the --stats contract: build, plan, raster, draw, reconstruct, shade
+    // In order; names as in the --stats contract: build, shadows, plan, raster, draw, reconstruct
     // (seconds of wall time).
     std::vector<std::pair<std::string, double>> phases;
     double seconds = 0.0;        // from view to shaded picture
@@ -31,6 +31,8 @@ struct FrameStats {
     uint64_t large_triangles = 0;  // given to the z-buffer
     uint64_t small_triangles = 0;  // rasterized in tiles
     double overestimation = 0.0;   // points drawn in the frustum / points needed
+    uint64_t shadow_points = 0;    // drawn into shadow maps
+    size_t shadow_bytes = 0;       // of shadow maps
     size_t cache_bytes = 0;        // of the point lists
     std::string debug_text;        // one line on the pixel asked for
 };
