@@ -38,7 +38,7 @@ public:
         return false;
     }
     void endTile(const SampleLookup&) override {
-        if (context_.settings.fill) fillHoles(tile_, scratch_);
+        if (context_.settings.fill) fillHoles(tile_, context_.view, scratch_);
         take_depths_(inner_, tile_);
     }
     TileCounters counters() const override { return depth_pass_.counters(); }

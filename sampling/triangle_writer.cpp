@@ -44,6 +44,8 @@ void triangleAttributes(const Scene& scene, const View& view, const InstanceFram
     sample.albedo = surface.albedo;
     sample.finish = surface.finish;
     sample.material = mesh.triangle_material[triangle];
+    sample.patch_width = mesh.strata[mesh.triangle_stratum[triangle]].patch_width *
+                         float(std::sqrt(frame.area_scale));
     sample.object = objectId(frame.path);
 }
 

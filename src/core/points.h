@@ -61,6 +61,10 @@ constexpr uint8_t patchWidthCode(float width, int first_exponent) {
         int(std::bit_cast<uint32_t>(width) >> 20) - ((127 + first_exponent) * kWidthsPerOctave);
     return uint8_t(std::clamp(bits, 1, kWidthCodes - 1));
 }
+constexpr float patchWidth(uint8_t code, int first_exponent) {
+    return std::bit_cast<float>(uint32_t(int(code) + (127 + first_exponent) * kWidthsPerOctave)
+                                << 20);
+}
 // In subpixels. Code 0, kNoPatch, is kept for points that cover no more than the subpixel they lie
 // in, or 1/K of it.
 inline constexpr int kFirstSubpixelExponent = -8;

@@ -24,6 +24,12 @@ float depthAt(const ShadowLevel& level, int x, int y) {
                        size_t(x % kPageTexels)];
 }
 
+// How much nearer to the sun the same patch may be elsewhere in the texels around a sample. A patch
+// much smaller than a texel has hardly another point there.
+float depthOfPatch(float width, float texel) {
+    return 0.5f * width * std::min(1.0f, width / texel);
+}
+
 }  // namespace
 
 int levelExponent(float metres) {
@@ -65,12 +71,14 @@ float ShadowPages::of(size_t sun_index, const SurfaceSample& sample) const {
             continue;
         const int x0 = int(x), y0 = int(y);
         const float fx = x - float(x0), fy = y - float(y0);
-        const float nearest_shadow = p.z - kBias * level.texel / sine;
+        const float most = depthOfPatch(sample.patch_width, level.texel);
         float visible = 0.0f;
         for (int k = 0; k < 4; ++k) {
             const int dx = k & 1, dy = k >> 1;
-            const float plane = nearest_shadow + level.texel * (slope_x * (float(dx) - fx) +
-                                                                slope_y * (float(dy) - fy));
+            const float to_texel =
+                level.texel * (slope_x * (float(dx) - fx) + slope_y * (float(dy) - fy));
+            const float plane = p.z + std::clamp(to_texel, -most, most) -
+                                std::min(kBias * level.texel / sine, most);
             const float depth = depthAt(level, x0 + dx, y0 + dy);
             const float weight = (dx ? fx : 1.0f - fx) * (dy ? fy : 1.0f - fy);
             if (std::isnan(depth)) {
