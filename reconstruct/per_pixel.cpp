@@ -9,6 +9,9 @@ namespace stipple {
 
 namespace {
 
+// Numbers of the z-buffer use the bit for themselves, and it has no holes.
+bool isOnSurface(uint32_t number) { return (number & kSurfaceBit) && !(number & kZBufferBit); }
+
 // Depth from which something lies clearly behind.
 struct Behind {
     float scale = 1.02f, offset = 0.0f;
@@ -40,13 +43,13 @@ bool fillOnce(DepthTile& tile, const Behind& behind, std::vector<uint64_t>& scra
                 const float d = DepthTile::depthOf(key);
                 if (behind.of(d) < here) {
                     ++in_front;
-                    on_surface += (DepthTile::numberOf(key) & kKindBits) == kSurfaceBit;
+                    on_surface += isOnSurface(DepthTile::numberOf(key));
                     farthest_front = std::max(farthest_front, d);
                     if (d < nearest_depth) nearest_depth = d, nearest = key;
                 }
             }
             // All but one, and they agree on one depth within what a slanted surface spans over
-            // three subpixels. Triangles have no holes, and gaps between leaves are none.
+            // three subpixels. Gaps between leaves are no holes.
             if (in_front >= 7 && on_surface >= 4 && farthest_front < behind.of(nearest_depth)) {
                 tile.keys()[size_t(y) * size_t(w) + size_t(x)] =
                     DepthTile::pack(farthest_front, DepthTile::numberOf(nearest));

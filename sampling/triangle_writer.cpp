@@ -84,10 +84,11 @@ void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t tria
     const Stratum& stratum = mesh.strata[node.stratum];
     const Mat3 linear(frame.camera_from_object.linear);
     const Vec3 translation(frame.camera_from_object.translation);
+    const uint32_t kind = kTriangleBit | (isWide(frame, node, stratum) ? kSurfaceBit : 0);
     for (uint32_t first = 0; first < node.triangle_count; first += kBlockPoints) {
         TriangleBlock& block = block_;
         block.count = int(std::min<uint32_t>(kBlockPoints, node.triangle_count - first));
-        block.first_number = context_.nextNumber() | kTriangleBit;
+        block.first_number = context_.nextNumber() | kind;
         for (int i = 0; i < block.count; ++i) {
             const UVec3& t = mesh.triangles[node.first_triangle + first + uint32_t(i)];
             for (int k = 0; k < 3; ++k) {
@@ -106,6 +107,16 @@ void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t tria
         block.mask = stratum.masked ? &mask : nullptr;
         if (!context_.sink->take(block)) context_.runs.pop_back();
     }
+}
+
+bool TriangleWriter::isWide(const InstanceFrame& frame, const MeshNode& node,
+                            const Stratum& stratum) const {
+    const View& view = context_.view;
+    const float z = view.orthographic
+                        ? 1.0f
+                        : float(frame.camera_from_object.point(DVec3(node.bounds.center())).z);
+    const float width = stratum.patch_width * float(std::sqrt(frame.area_scale));
+    return width * float(view.focal) >= kSurfaceWidth * z;
 }
 
 // Single-sided triangles seen from behind become degenerate, so that numbers stay in place.

@@ -45,7 +45,8 @@ inline constexpr int kBlockPoints = 64;
 // test.
 inline constexpr uint32_t kZBufferBit = 0x80000000u;   // a triangle of the frame's z-buffer
 inline constexpr uint32_t kTriangleBit = 0x40000000u;  // a triangle emitted in the tile
-inline constexpr uint32_t kSurfaceBit = 0x20000000u;   // a point on a wide patch (kSurfaceWidth)
+inline constexpr uint32_t kSurfaceBit = 0x20000000u;   // a point, or a triangle of the tile, on a
+                                                       // wide patch (kSurfaceWidth)
 inline constexpr uint32_t kAnyTriangle = kZBufferBit | kTriangleBit;
 inline constexpr uint32_t kKindBits = kAnyTriangle | kSurfaceBit;
 
