@@ -208,6 +208,35 @@ TEST(Shadows, sameBitsForAnyNumberOfThreads) {
     }
 }
 
+// Texels lie still in the world: where the camera goes aside by whole pixels, so does the picture.
+TEST(Shadows, doNotSwimWhenTheCameraMoves) {
+    TestScene t(Vec3(-1.0f, 0.7f, 0.3f));
+    TreeParams params;
+    params.triangles = 4000;
+    params.height = 6.0;
+    t.add(makeTree(params), placed(DVec3(0.0), DVec3(1.0)));
+    const Scene& scene = t.build();
+    FrameRequest r = request();
+    r.camera = lookAt(DVec3(0, 30, 0), DVec3(0.0), DVec3(0, 0, -1));
+    r.camera.orthographic = true;
+    r.camera.height = 10.0;
+    const Image before = render(scene, r, Method::kZBuffer, true);
+    constexpr int kMoved = 7;  // pixels
+    r.camera.eye += r.camera.world_from_camera[0] * (kMoved * r.camera.height / kHeight);
+    const Image after = render(scene, r, Method::kZBuffer, true);
+    int changed = 0, shaded = 0;
+    const float lit = before.pixel(2, 2)[1];
+    for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x + kMoved < kWidth; ++x) {
+            const float was = before.pixel(x + kMoved, y)[1];
+            shaded += was < 0.9f * lit;
+            changed += std::abs(after.pixel(x, y)[1] - was) > 0.01f * was;
+        }
+    }
+    EXPECT_GT(shaded, 2000);
+    EXPECT_LT(changed, shaded / 100);
+}
+
 TEST(Shadows, everyReconstructionTakesThem) {
     TestScene t(Vec3(-1.0f, 0.7f, 0.3f));
     t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 0.75, 0), DVec3(1.5), 0.5));
