@@ -25,7 +25,7 @@ void SubpixelShader::showPoint(const SampleLookup& lookup, const Vec3& p_camera,
                                const Vec2& p_sub) {
     sample_.depth = p_camera.z;
     sample_.position_camera = p_camera;
-    lookup.lookUp(number, p_sub.x, p_sub.y, sample_);
+    lookup.lookUp(number & ~kSurfaceBit, p_sub.x, p_sub.y, sample_);
     radiance_ = shadeSample(sample_);
     last_number_ = kNoNumber;
 }

@@ -37,7 +37,9 @@ struct TileContext {
 
     // Below kSurfaceBit.
     uint32_t nextNumber() const { return uint32_t(runs.size()) * kBlockPoints; }
-    const Run& runOf(uint32_t number) const { return runs[(number & ~kKindBits) / kBlockPoints]; }
+    const Run& runOf(uint32_t number) const {
+        return runs[(number & ~kAnyTriangle) / kBlockPoints];
+    }
 };
 
 }  // namespace stipple

@@ -84,11 +84,11 @@ void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t tria
     const Stratum& stratum = mesh.strata[node.stratum];
     const Mat3 linear(frame.camera_from_object.linear);
     const Vec3 translation(frame.camera_from_object.translation);
-    const uint32_t kind = kTriangleBit | (isWide(frame, node, stratum) ? kSurfaceBit : 0);
+    block_.is_wide = isWide(frame, node, stratum);
     for (uint32_t first = 0; first < node.triangle_count; first += kBlockPoints) {
         TriangleBlock& block = block_;
         block.count = int(std::min<uint32_t>(kBlockPoints, node.triangle_count - first));
-        block.first_number = context_.nextNumber() | kind;
+        block.first_number = context_.nextNumber() | kTriangleBit;
         for (int i = 0; i < block.count; ++i) {
             const UVec3& t = mesh.triangles[node.first_triangle + first + uint32_t(i)];
             for (int k = 0; k < 3; ++k) {

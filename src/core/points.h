@@ -45,10 +45,10 @@ inline constexpr int kBlockPoints = 64;
 // test.
 inline constexpr uint32_t kZBufferBit = 0x80000000u;   // a triangle of the frame's z-buffer
 inline constexpr uint32_t kTriangleBit = 0x40000000u;  // a triangle emitted in the tile
-inline constexpr uint32_t kSurfaceBit = 0x20000000u;   // a point, or a triangle of the tile, on a
-                                                       // wide patch (kSurfaceWidth)
+// Set by reconstructions in their keys alone: a point, or a triangle of the tile, on a
+// wide patch (kSurfaceWidth).
+inline constexpr uint32_t kSurfaceBit = 0x20000000u;
 inline constexpr uint32_t kAnyTriangle = kZBufferBit | kTriangleBit;
-inline constexpr uint32_t kKindBits = kAnyTriangle | kSurfaceBit;
 
 // Kernels work on whole vectors and may write this far beyond a block's last point.
 inline constexpr int kBlockPadding = 16;
@@ -106,6 +106,7 @@ struct TriangleBlock {
     int count = 0;
     uint32_t first_number = 0;
     const MaskTest* mask = nullptr;        // nullptr: all surface
+    bool is_wide = false;                  // on a patch at least kSurfaceWidth wide
     alignas(64) float x[3][kBlockPoints];  // of the three vertices
     alignas(64) float y[3][kBlockPoints];
     alignas(64) float z[3][kBlockPoints];

@@ -49,6 +49,8 @@ private:
             sample.material = points_[number].material;
             sample.normal_world = points_[number].normal;
             sample.albedo = Vec3(0);
+            sample.finish = SurfaceFinish();
+            sample.finish.emissive[int(sample.material)] = 1.0f;  // red, green or blue
             sample.object = 1;
         }
         void forget() override {}
@@ -75,7 +77,6 @@ struct TestFrame {
         settings.height = 40;
         for (int i = 0; i < 3; ++i) {
             Material m;
-            m.emissive = Vec3(i == 0, i == 1, i == 2);
             m.double_sided = true;
             materials.push_back(m);
         }
