@@ -12,7 +12,7 @@ DepthPass::DepthPass(const ReconstructionContext& context, int splat_subpixels)
       side_(is_splat_ ? splat_subpixels : 2),
       splat_world_(is_splat_ ? float(context.settings.splat_world) : 0.0f),
       footprints_(float(context.settings.samples)),
-      wants_counts_(context.picture->image().channelIndex("count") >= 0) {
+      wants_counts_(context.picture && context.picture->image().channelIndex("count") >= 0) {
     if (is_splat_) footprints_.wide_share.fill(1.0f);
 }
 

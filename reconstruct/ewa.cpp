@@ -74,7 +74,7 @@ public:
         if (pass == 0) return;
         for (size_t i = 0; i < front_.keys().size(); ++i)
             front_.keys()[i] = std::min(front_.keys()[i], hits_.keys()[i]);
-        if (context_.settings.fill) fillHoles(front_, scratch_);
+        if (context_.settings.fill) fillHoles(front_, context_.view, scratch_);
         front_.refreshHidden();
     }
 

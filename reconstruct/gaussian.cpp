@@ -54,7 +54,7 @@ public:
         lookup_ = &lookup;
         if (pass == 0) return;
         closeSurfaces();
-        if (context_.settings.fill) fillHoles(tile_, scratch_);
+        if (context_.settings.fill) fillHoles(tile_, context_.view, scratch_);
         tile_.refreshHidden();
     }
 
@@ -105,7 +105,7 @@ private:
                 surfaces_.keys()[i] = std::min(surfaces_.keys()[i], key);
         }
         // What is left open is a subpixel or two, erosion would make a square of it.
-        if (context_.settings.fill) fillHoles(surfaces_, scratch_);
+        if (context_.settings.fill) fillHoles(surfaces_, context_.view, scratch_);
         erodeSplats(
             surfaces_, [&](float) { return side_ / 2; }, scratch_);
         for (size_t i = 0; i < scratch_.size(); ++i) {

@@ -9,7 +9,22 @@ namespace stipple {
 
 namespace {
 
-bool fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
+// Numbers of the z-buffer use the bit for themselves, and it has no holes.
+bool isOnSurface(uint32_t number) { return (number & kSurfaceBit) && !(number & kZBufferBit); }
+
+// Depth from which something lies clearly behind.
+struct Behind {
+    float scale = 1.02f, offset = 0.0f;
+
+    explicit Behind(const View& view) {
+        if (!view.orthographic) return;
+        scale = 1.0f;
+        offset = 4.0f / float(view.focal);
+    }
+    float of(float depth) const { return depth * scale + offset; }
+};
+
+bool fillOnce(DepthTile& tile, const Behind& behind, std::vector<uint64_t>& scratch) {
     const int width = tile.rect().width(), height = tile.rect().height(), w = tile.stride();
     scratch = tile.keys();
     bool is_changed = false;
@@ -26,17 +41,16 @@ bool fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
             float nearest_depth = kInfinity, farthest_front = 0.0f;
             for (const uint64_t key : around) {
                 const float d = DepthTile::depthOf(key);
-                if (d * 1.02f < here) {
+                if (behind.of(d) < here) {
                     ++in_front;
-                    on_surface +=
-                        (DepthTile::numberOf(key) & (kAnyTriangle | kSurfaceBit)) == kSurfaceBit;
+                    on_surface += isOnSurface(DepthTile::numberOf(key));
                     farthest_front = std::max(farthest_front, d);
                     if (d < nearest_depth) nearest_depth = d, nearest = key;
                 }
             }
             // All but one, and they agree on one depth within what a slanted surface spans over
-            // three subpixels. Triangles have no holes, and gaps between leaves are none.
-            if (in_front >= 7 && on_surface >= 4 && farthest_front < nearest_depth * 1.02f) {
+            // three subpixels. Gaps between leaves are no holes.
+            if (in_front >= 7 && on_surface >= 4 && farthest_front < behind.of(nearest_depth)) {
                 tile.keys()[size_t(y) * size_t(w) + size_t(x)] =
                     DepthTile::pack(farthest_front, DepthTile::numberOf(nearest));
                 is_changed = true;
@@ -48,9 +62,10 @@ bool fillOnce(DepthTile& tile, std::vector<uint64_t>& scratch) {
 
 }  // namespace
 
-void fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch) {
+void fillHoles(DepthTile& tile, const View& view, std::vector<uint64_t>& scratch) {
     // Again for holes of three subpixels and more, whose ends the first time closes.
-    if (fillOnce(tile, scratch)) fillOnce(tile, scratch);
+    const Behind behind(view);
+    if (fillOnce(tile, behind, scratch)) fillOnce(tile, behind, scratch);
 }
 
 namespace {
@@ -90,7 +105,7 @@ public:
             erodeSplats(tile_, reach, scratch_);
             tile_.keys().swap(scratch_);
         }
-        if (context_.settings.fill) fillHoles(tile_, scratch_);
+        if (context_.settings.fill) fillHoles(tile_, context_.view, scratch_);
         const int s = context_.view.subpixels;
         for (int py = inner_.y0 / s; py < inner_.y1 / s; ++py) {
             for (int px = inner_.x0 / s; px < inner_.x1 / s; ++px) {

@@ -16,6 +16,7 @@ std::unique_ptr<TileReconstruction> makePerPixel(const ReconstructionContext& co
 
 // Occlusion removal and filling in one: a subpixel that is empty, or shows something clearly behind
 // what most of its neighbours agree to be one surface, takes a neighbour's point.
-void fillHoles(DepthTile& tile, std::vector<uint64_t>& scratch);
+// Clearly behind: by 2 % of the depth in perspective, by four subpixels in orthographic views.
+void fillHoles(DepthTile& tile, const View& view, std::vector<uint64_t>& scratch);
 
 }  // namespace stipple

@@ -9,6 +9,7 @@
 #include <core/points.h>
 #include <core/raster_job.h>
 #include <core/settings.h>
+#include <core/sun_visibility.h>
 #include <reconstruct/picture.h>
 
 #include <memory>
@@ -29,7 +30,8 @@ struct ReconstructionContext {
     RenderSettings settings;
     const std::vector<Material>* materials = nullptr;
     const Lighting* lighting = nullptr;
-    const RasterTarget* base = nullptr;  // rasterized triangles; nullptr: none
+    const RasterTarget* base = nullptr;             // rasterized triangles; nullptr: none
+    const SunVisibility* sun_visibility = nullptr;  // nullptr: nothing casts shadows
     Picture* picture = nullptr;
 };
 

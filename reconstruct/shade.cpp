@@ -140,7 +140,7 @@ Vec3 skyRadiance(const Sky& sky, const Vec3& direction) {
 }
 
 Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
-           const View& view) {
+           const View& view, const SunVisibility* visibility) {
     if (material.unlit) return sample.albedo;
     const Vec3 to_eye_camera =
         view.orthographic ? Vec3(0.0f, 0.0f, -1.0f) : -sample.position_camera;
@@ -181,7 +181,12 @@ Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting
         }
         radiance += irradiance * reflected * cosine;
     };
-    for (const Sun& sun : lighting.suns) addLight(sun.direction_to_light, sun.irradiance);
+    for (size_t i = 0; i < lighting.suns.size(); ++i) {
+        const Sun& sun = lighting.suns[i];
+        if (through == Vec3(0.0f) && glm::dot(n, sun.direction_to_light) <= 0.0f) continue;
+        const float visible = visibility ? visibility->of(i, sample) : 1.0f;
+        if (visible > 0.0f) addLight(sun.direction_to_light, sun.irradiance * visible);
+    }
     if (!lighting.points.empty()) {
         const Vec3 from_eye = Mat3(glm::transpose(view.camera_from_world)) * sample.position_camera;
         for (const PointLight& light : lighting.points) {

@@ -8,14 +8,15 @@
 #include <core/camera.h>
 #include <core/light.h>
 #include <core/material.h>
+#include <core/sun_visibility.h>
 #include <core/surface.h>
 
 namespace stipple {
 
 // Radiance towards the eye, linear. The sample's normal is turned towards the viewer for
-// double-sided materials.
+// double-sided materials. visibility: of the suns; null: nothing casts shadows.
 Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
-           const View& view);
+           const View& view, const SunVisibility* visibility = nullptr);
 
 // The two parts of a surface's BRDF, without translucency: what a light's irradiance on a surface
 // that faces it is multiplied with, but for the cosine. normal, to_light, to_eye: unit vectors;

@@ -6,7 +6,8 @@
 namespace stipple {
 
 Vec3 SubpixelShader::shadeSample(const SurfaceSample& sample) const {
-    return shade(sample, (*context_.materials)[sample.material], *context_.lighting, context_.view);
+    return shade(sample, (*context_.materials)[sample.material], *context_.lighting, context_.view,
+                 context_.sun_visibility);
 }
 
 void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y) {

@@ -83,7 +83,8 @@ inline __attribute__((always_inline)) uint64_t rasterize(const View& view,
         const float ub_x = (p.y[2][i] - ay) * inverse, ub_y = -(p.x[2][i] - ax) * inverse;
         const float uc_x = -(p.y[1][i] - ay) * inverse, uc_y = (p.x[1][i] - ax) * inverse;
         const float q0 = p.q[0][i], dq1 = p.q[1][i] - q0, dq2 = p.q[2][i] - q0;
-        const uint32_t number = block.first_number + uint32_t(i);
+        const uint32_t number =
+            (block.first_number + uint32_t(i)) | (block.is_wide ? kSurfaceBit : 0);
         for (int y = y0; y <= y1; ++y) {
             const float dy = float(y) + 0.5f - ay;
             const float ub_row = dy * ub_y, uc_row = dy * uc_y;

@@ -17,6 +17,7 @@ LookupBeam subpixelBeam(const View& view, float sub_x, float sub_y, float depth,
 void pointAttributes(const Scene& scene, const View& view, const Run& run, const ListBlock& list,
                      int lane, float sub_x, float sub_y, SurfaceSample& sample) {
     sample.material = list.material[lane];
+    sample.patch_width = patchWidth(list.width[lane], kFirstMetreExponent) * run.length_scale;
     const Material& material = scene.materials[sample.material];
     uint64_t path = run.path;
     const Group* group = run.child.isGroup() ? &scene.groups[run.child.index()] : nullptr;

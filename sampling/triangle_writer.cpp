@@ -44,6 +44,8 @@ void triangleAttributes(const Scene& scene, const View& view, const InstanceFram
     sample.albedo = surface.albedo;
     sample.finish = surface.finish;
     sample.material = mesh.triangle_material[triangle];
+    sample.patch_width = mesh.strata[mesh.triangle_stratum[triangle]].patch_width *
+                         float(std::sqrt(frame.area_scale));
     sample.object = objectId(frame.path);
 }
 
@@ -82,6 +84,7 @@ void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t tria
     const Stratum& stratum = mesh.strata[node.stratum];
     const Mat3 linear(frame.camera_from_object.linear);
     const Vec3 translation(frame.camera_from_object.translation);
+    block_.is_wide = isWide(frame, node, stratum);
     for (uint32_t first = 0; first < node.triangle_count; first += kBlockPoints) {
         TriangleBlock& block = block_;
         block.count = int(std::min<uint32_t>(kBlockPoints, node.triangle_count - first));
@@ -104,6 +107,16 @@ void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t tria
         block.mask = stratum.masked ? &mask : nullptr;
         if (!context_.sink->take(block)) context_.runs.pop_back();
     }
+}
+
+bool TriangleWriter::isWide(const InstanceFrame& frame, const MeshNode& node,
+                            const Stratum& stratum) const {
+    const View& view = context_.view;
+    const float z = view.orthographic
+                        ? 1.0f
+                        : float(frame.camera_from_object.point(DVec3(node.bounds.center())).z);
+    const float width = stratum.patch_width * float(std::sqrt(frame.area_scale));
+    return width * float(view.focal) >= kSurfaceWidth * z;
 }
 
 // Single-sided triangles seen from behind become degenerate, so that numbers stay in place.

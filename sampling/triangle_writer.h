@@ -17,6 +17,8 @@ public:
 private:
     class Mask;
 
+    // Whether holes beside the node's triangles are to be closed (kSurfaceWidth).
+    bool isWide(const InstanceFrame& frame, const MeshNode& node, const Stratum& stratum) const;
     void dropBackFaces(const InstanceFrame& frame, TriangleBlock& block) const;
 
     TileContext& context_;

@@ -45,7 +45,8 @@ inline constexpr int kBlockPoints = 64;
 // they carry the kind in their high bits, so that all kinds meet in one depth test.
 inline constexpr uint32_t kZBufferBit = 0x80000000u;   // a triangle of the frame's z-buffer
 inline constexpr uint32_t kTriangleBit = 0x40000000u;  // a triangle emitted in the tile
-// Set by reconstructions in their keys alone: a point on a wide patch (kSurfaceWidth).
+// Set by reconstructions in their keys alone: a point, or a triangle of the tile, on a
+// wide patch (kSurfaceWidth).
 inline constexpr uint32_t kSurfaceBit = 0x20000000u;
 inline constexpr uint32_t kAnyTriangle = kZBufferBit | kTriangleBit;
 
@@ -60,6 +61,10 @@ constexpr uint8_t patchWidthCode(float width, int first_exponent) {
     const int bits =
         int(std::bit_cast<uint32_t>(width) >> 20) - ((127 + first_exponent) * kWidthsPerOctave);
     return uint8_t(std::clamp(bits, 1, kWidthCodes - 1));
+}
+constexpr float patchWidth(uint8_t code, int first_exponent) {
+    return std::bit_cast<float>(uint32_t(int(code) + (127 + first_exponent) * kWidthsPerOctave)
+                                << 20);
 }
 // In subpixels. Code 0, kNoPatch, is kept for points that cover no more than the subpixel they lie
 // in, or 1/K of it.
@@ -101,6 +106,7 @@ struct TriangleBlock {
     int count = 0;
     uint32_t first_number = 0;
     const MaskTest* mask = nullptr;        // nullptr: all surface
+    bool is_wide = false;                  // on a patch at least kSurfaceWidth wide
     alignas(64) float x[3][kBlockPoints];  // of the three vertices
     alignas(64) float y[3][kBlockPoints];
     alignas(64) float z[3][kBlockPoints];

@@ -6,6 +6,7 @@
 #include <core/surface.h>
 
 #include <cstddef>
+#include <cstdint>
 
 namespace stipple {
 
@@ -33,6 +34,9 @@ public:
     // Nearest hits of `count` rays. Thread-safe. footprint_per_t: diameter of a ray's footprint
     // grows by it per unit of t (texture filtering); 0 for none.
     virtual void cast(const Ray* rays, size_t count, RayHit* hits, float footprint_per_t) const = 0;
+    // Whether anything that faces the ray's end stops it (what a light at that end would see):
+    // is_hit[i] is 1 or 0. Thread-safe.
+    virtual void occluded(const Ray* rays, size_t count, uint8_t* is_hit) const = 0;
     virtual size_t bytes() const = 0;
 };
 

@@ -118,7 +118,7 @@ std::vector<Entry> makeEntries() {
                             "how points become a picture"),
         number("splat_size", &S::splat_size, 0.1, 64.0, "pixels",
                "side of a splat, or of the box that has a gaussian's variance"),
-        onOff("shadows", &S::shadows, "shadows of the suns; not yet available"),
+        onOff("shadows", &S::shadows, "shadows of the suns"),
         onOff("ao", &S::ao, "ambient occlusion; not yet available"),
         number("seed", &S::seed, uint64_t(0), ~uint64_t(0), "",
                "the same seed gives the same picture, bit for bit"),
@@ -154,6 +154,8 @@ std::vector<Entry> makeEntries() {
               "a coarse depth buffer hides only what lies three of its pixels behind", kOnlySet),
         number("ewa_prefilter", &S::ewa_prefilter, 0.0, 16.0, "subpixels",
                "standard deviation of the filter that ewa adds to a splat", kOnlySet),
+        number("shadow_texel", &S::shadow_texel, 0.25, 16.0, "pixels",
+               "side of a shadow map's texel where the camera sees it", kOnlySet),
         onOff("fill", &S::fill, "per-pixel reconstruction removes hidden points and fills gaps",
               kOnlySet),
     };

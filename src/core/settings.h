@@ -33,6 +33,7 @@ struct RenderSettings {
     bool pull_push_threshold = true;  // a coarse depth hides only what lies three pixels behind it
     double ewa_prefilter = 0.4;       // standard deviation, subpixels
     bool shadows = false;
+    double shadow_texel = 1.0;  // side of a shadow map's texel where it is seen, pixels
     bool ao = false;
     uint64_t seed = 1;
     int threads = 0;              // 0: one a core

@@ -37,6 +37,7 @@ struct Level {
     const Level* parent = nullptr;      // the level from which the ray came here ...
     PartSlot from;                      // ... and through which of its instances
     int depth = 0;                      // slots from the root to the group
+    bool is_from_end = false;           // surfaces are looked at from the rays' far ends
     // The ray in double, in the group's space: rounding errors must not add up on the way down.
     // Nested scenes only.
     DVec3 origin = DVec3(0.0);
@@ -79,7 +80,8 @@ void filterHit(const RTCFilterFunctionNArguments* args) {
             const Vec3 normal(RTCHitN_Ng_x(args->hit, args->N, i),
                               RTCHitN_Ng_y(args->hit, args->N, i),
                               RTCHitN_Ng_z(args->hit, args->N, i));
-            if (glm::dot(direction, normal) > 0.0f) {
+            const float away = glm::dot(direction, normal);
+            if (level.is_from_end ? away < 0.0f : away > 0.0f) {
                 args->valid[i] = 0;
                 continue;
             }
@@ -96,11 +98,15 @@ void filterHit(const RTCFilterFunctionNArguments* args) {
     }
 }
 
+RTCRay makeRay(const Vec3& origin, const Vec3& direction, float t_min, float t_max, uint32_t id) {
+    return {origin.x,    origin.y, origin.z, t_min, direction.x, direction.y,
+            direction.z, 0.0f,     t_max,    ~0u,   id,          0};
+}
+
 RTCRayHit makeRayHit(const Vec3& origin, const Vec3& direction, float t_min, float t_max,
                      uint32_t id) {
     RTCRayHit r;
-    r.ray = {origin.x,    origin.y, origin.z, t_min, direction.x, direction.y,
-             direction.z, 0.0f,     t_max,    ~0u,   id,          0};
+    r.ray = makeRay(origin, direction, t_min, t_max, id);
     r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     return r;
@@ -130,31 +136,36 @@ HitPlace placeOf(const Level& level, uint32_t instance_id, uint32_t geometry_id,
     return place;
 }
 
-// Carries a ray into a group instance. t means the same there: the direction is transformed, not
-// normalized.
+// The level of a group instance that a ray of the level above meets. t means the same there: the
+// direction is transformed, not normalized.
+Level makeInnerLevel(const GroupScene& parent, const Level& outer, uint32_t primitive_id) {
+    const PartSlot at = parent.groupAt(primitive_id);
+    const GroupScene& child =
+        parent.scenes->groups[at.part->group->instances.child(at.slot).index()];
+    const Affine child_from_parent = inverse(at.part->sceneFromChild(at.slot));
+    Level level = makeLevel(child, outer.embree.flags);
+    level.parent = &outer;
+    level.from = at;
+    level.depth = outer.depth + at.part->depth();
+    level.is_from_end = outer.is_from_end;
+    level.origin = child_from_parent.point(outer.origin);
+    level.direction = child_from_parent.linear * outer.direction;
+    level.rays = outer.rays;
+    level.nested_hit = outer.nested_hit;
+    return level;
+}
+
+// Carries a ray into a group instance.
 void intersectGroup(const RTCIntersectFunctionNArguments* args) {
     if (args->valid[0] != kAllActive)
         return;  // N is 1: scenes with nested groups are not traced in packets
     const GroupScene& parent = *static_cast<const GroupScene*>(args->geometryUserPtr);
     const Level& outer_level = *reinterpret_cast<const Level*>(args->context);
     RTCRayHit& outer = *reinterpret_cast<RTCRayHit*>(args->rayhit);
-
-    const PartSlot at = parent.groupAt(args->primID);
-    const GroupScene& child =
-        parent.scenes->groups[at.part->group->instances.child(at.slot).index()];
-    const Affine child_from_parent = inverse(at.part->sceneFromChild(at.slot));
-    Level level = makeLevel(child, outer_level.embree.flags);
-    level.parent = &outer_level;
-    level.from = at;
-    level.depth = outer_level.depth + at.part->depth();
-    level.origin = child_from_parent.point(outer_level.origin);
-    level.direction = child_from_parent.linear * outer_level.direction;
-    level.rays = outer_level.rays;
-    level.nested_hit = outer_level.nested_hit;
-
+    Level level = makeInnerLevel(parent, outer_level, args->primID);
     RTCRayHit inner = makeRayHit(Vec3(level.origin), Vec3(level.direction), outer.ray.tnear,
                                  outer.ray.tfar, outer.ray.id);
-    rtcIntersect1(child.handle.get(), &level.embree, &inner);
+    rtcIntersect1(level.group->handle.get(), &level.embree, &inner);
     if (inner.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
     if (!isNested(inner.hit)) {
         *level.nested_hit = placeOf(level, inner.hit.instID[0], inner.hit.geomID, inner.hit.primID,
@@ -167,8 +178,36 @@ void intersectGroup(const RTCIntersectFunctionNArguments* args) {
     outer.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 }
 
+// The same for a ray of which only matters whether it is stopped.
+void occludeGroup(const RTCOccludedFunctionNArguments* args) {
+    if (args->valid[0] != kAllActive) return;  // N is 1
+    const GroupScene& parent = *static_cast<const GroupScene*>(args->geometryUserPtr);
+    const Level& outer_level = *reinterpret_cast<const Level*>(args->context);
+    RTCRay& outer = *reinterpret_cast<RTCRay*>(args->ray);
+    Level level = makeInnerLevel(parent, outer_level, args->primID);
+    RTCRay inner =
+        makeRay(Vec3(level.origin), Vec3(level.direction), outer.tnear, outer.tfar, outer.id);
+    rtcOccluded1(level.group->handle.get(), &level.embree, &inner);
+    if (inner.tfar < 0.0f) outer.tfar = -kInfinity;
+}
+
 bool isTraceable(const Ray& ray) {
     return isFinite(DVec3(ray.origin)) && isFinite(DVec3(ray.direction)) && ray.t_min >= 0.0f;
+}
+
+void setRay(RTCRay16& r, unsigned i, const Ray& ray) {
+    r.org_x[i] = ray.origin.x;
+    r.org_y[i] = ray.origin.y;
+    r.org_z[i] = ray.origin.z;
+    r.tnear[i] = ray.t_min;
+    r.dir_x[i] = ray.direction.x;
+    r.dir_y[i] = ray.direction.y;
+    r.dir_z[i] = ray.direction.z;
+    r.time[i] = 0.0f;
+    r.tfar[i] = ray.t_max;
+    r.mask[i] = ~0u;
+    r.id[i] = i;
+    r.flags[i] = 0;
 }
 
 // Packets pay where rays go through the same nodes.
@@ -186,7 +225,8 @@ bool areCoherent(const Ray* rays, size_t count) {
 class EmbreeRayCaster : public RayCaster {
 public:
     EmbreeRayCaster(const Scene& scene, const DVec3& origin_world, int n_threads)
-        : scenes_(scene, origin_world, n_threads, TraceCallbacks{filterHit, intersectGroup}) {}
+        : scenes_(scene, origin_world, n_threads,
+                  TraceCallbacks{filterHit, intersectGroup, occludeGroup}) {}
 
     void cast(const Ray* rays, size_t count, RayHit* hits, float footprint_per_t) const override {
         const bool packets = scenes_.root().n_groups == 0;
@@ -203,9 +243,48 @@ public:
         }
     }
 
+    void occluded(const Ray* rays, size_t count, uint8_t* is_hit) const override {
+        const bool packets = scenes_.root().n_groups == 0;
+        for (size_t begin = 0; begin < count; begin += kPacket) {
+            const size_t n = std::min(kPacket, count - begin);
+            if (packets && n == kPacket) {
+                occludedPacket(rays + begin, is_hit + begin);
+            } else {
+                for (size_t i = begin; i < begin + n; ++i) is_hit[i] = occludedOne(rays[i]);
+            }
+        }
+    }
+
     size_t bytes() const override { return scenes_.bytes(); }
 
 private:
+    uint8_t occludedOne(const Ray& ray) const {
+        if (!isTraceable(ray)) return 0;
+        Level level = makeLevel(scenes_.root(), RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+        level.is_from_end = true;
+        level.origin = DVec3(ray.origin);
+        level.direction = DVec3(ray.direction);
+        level.rays = &ray;
+        RTCRay r = makeRay(ray.origin, ray.direction, ray.t_min, ray.t_max, 0);
+        rtcOccluded1(scenes_.root().handle.get(), &level.embree, &r);
+        return r.tfar < 0.0f;
+    }
+
+    // Rays to one light begin apart in foliage: Embree takes them one by one, but in one call.
+    void occludedPacket(const Ray* rays, uint8_t* is_hit) const {
+        RTCRay16 r;
+        alignas(64) int valid[kPacket];
+        for (unsigned i = 0; i < kPacket; ++i) {
+            valid[i] = isTraceable(rays[i]) ? kAllActive : 0;
+            setRay(r, i, rays[i]);
+        }
+        Level level = makeLevel(scenes_.root(), RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+        level.is_from_end = true;
+        level.rays = rays;
+        rtcOccluded16(valid, scenes_.root().handle.get(), &level.embree, &r);
+        for (unsigned i = 0; i < kPacket; ++i) is_hit[i] = valid[i] && r.tfar[i] < 0.0f;
+    }
+
     void castOne(const Ray& ray, RayHit& hit, float footprint_per_t) const {
         hit = RayHit();
         if (!isTraceable(ray)) return;
@@ -230,18 +309,7 @@ private:
         alignas(64) int valid[kPacket];
         for (unsigned i = 0; i < kPacket; ++i) {
             valid[i] = isTraceable(rays[i]) ? kAllActive : 0;
-            r.ray.org_x[i] = rays[i].origin.x;
-            r.ray.org_y[i] = rays[i].origin.y;
-            r.ray.org_z[i] = rays[i].origin.z;
-            r.ray.tnear[i] = rays[i].t_min;
-            r.ray.dir_x[i] = rays[i].direction.x;
-            r.ray.dir_y[i] = rays[i].direction.y;
-            r.ray.dir_z[i] = rays[i].direction.z;
-            r.ray.time[i] = 0.0f;
-            r.ray.tfar[i] = rays[i].t_max;
-            r.ray.mask[i] = ~0u;
-            r.ray.id[i] = i;
-            r.ray.flags[i] = 0;
+            setRay(r.ray, i, rays[i]);
             r.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
             r.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
         }

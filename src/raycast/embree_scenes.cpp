@@ -185,7 +185,10 @@ void EmbreeScenes::buildMesh(uint32_t index) {
                                    end - begins[i]);
         rtcSetGeometryBuildQuality(geometry.get(), RTC_BUILD_QUALITY_HIGH);
         rtcSetGeometryUserData(geometry.get(), &out.parts[i]);
-        if (filtered) rtcSetGeometryIntersectFilterFunction(geometry.get(), callbacks_.filter_hit);
+        if (filtered) {
+            rtcSetGeometryIntersectFilterFunction(geometry.get(), callbacks_.filter_hit);
+            rtcSetGeometryOccludedFilterFunction(geometry.get(), callbacks_.filter_hit);
+        }
         rtcCommitGeometry(geometry.get());
         rtcAttachGeometryByID(out.handle.get(), geometry.get(), uint32_t(i));
     }
@@ -286,6 +289,7 @@ void EmbreeScenes::buildGroup(uint32_t index, int level) {
         rtcSetGeometryUserData(geometry.get(), &out);
         rtcSetGeometryBoundsFunction(geometry.get(), groupInstanceBounds, nullptr);
         rtcSetGeometryIntersectFunction(geometry.get(), callbacks_.intersect_group);
+        rtcSetGeometryOccludedFunction(geometry.get(), callbacks_.occlude_group);
         rtcCommitGeometry(geometry.get());
         rtcAttachGeometryByID(out.handle.get(), geometry.get(), out.n_meshes);
     }

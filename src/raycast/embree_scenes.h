@@ -109,6 +109,7 @@ struct GroupScene {
 struct TraceCallbacks {
     RTCFilterFunctionN filter_hit = nullptr;          // geometry user data: MeshPart
     RTCIntersectFunctionN intersect_group = nullptr;  // geometry user data: GroupScene
+    RTCOccludedFunctionN occlude_group = nullptr;     // the same
 };
 
 struct EmbreeScenes {

@@ -23,6 +23,52 @@ struct RayBatch {
     std::vector<RayHit> hits;
 };
 
+// Shadows by their definition: a ray from every hit to every sun.
+class ShadowRays : public SunVisibility {
+public:
+    ShadowRays(const RayCaster& caster, const std::vector<Sun>& suns)
+        : caster_(caster), suns_(suns) {}
+
+    // For the hits of `rays`.
+    void cast(const std::vector<Ray>& rays, const std::vector<RayHit>& hits) {
+        is_hidden_.resize(suns_.size() * rays.size());
+        for (size_t s = 0; s < suns_.size(); ++s) {
+            to_sun_.clear();
+            ray_of_.clear();
+            for (size_t r = 0; r < rays.size(); ++r) {
+                if (!(hits[r].t < kInfinity)) continue;
+                to_sun_.push_back(rayToSun(rays[r], hits[r], suns_[s].direction_to_light));
+                ray_of_.push_back(r);
+            }
+            hit_.resize(to_sun_.size());
+            caster_.occluded(to_sun_.data(), to_sun_.size(), hit_.data());
+            for (size_t i = 0; i < ray_of_.size(); ++i)
+                is_hidden_[ray_of_[i] * suns_.size() + s] = hit_[i];
+        }
+    }
+    void select(size_t ray) { ray_ = ray; }
+    float of(size_t sun, const SurfaceSample&) const override {
+        return is_hidden_[ray_ * suns_.size() + sun] ? 0.0f : 1.0f;
+    }
+
+private:
+    // Begins off the surface by what floats lose at that distance from the eye.
+    static Ray rayToSun(const Ray& ray, const RayHit& hit, const Vec3& to_sun) {
+        constexpr float kOffset = 1e-5f;
+        const Vec3 p = ray.origin + ray.direction * hit.t;
+        const float offset = kOffset * std::max(glm::length(p), 0.01f);
+        const float side = glm::dot(hit.normal_world, to_sun) < 0.0f ? -1.0f : 1.0f;
+        return {p + hit.normal_world * (side * offset), 2.0f * offset, to_sun, kInfinity};
+    }
+
+    const RayCaster& caster_;
+    const std::vector<Sun>& suns_;
+    std::vector<Ray> to_sun_;
+    std::vector<size_t> ray_of_;
+    std::vector<uint8_t> hit_, is_hidden_;
+    size_t ray_ = 0;
+};
+
 // Offset of ray i of n in the pixel, in [0,1)^2: jittered in the cells of the squarest grid that n
 // fills, over which what is left is random. A single ray goes through the centre: at a straight
 // edge it sees what covers most of the pixel, with half the mean squared error of a random one.
@@ -53,9 +99,11 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
     if (request.progress) request.progress("draw", 0.0);
     std::atomic<size_t> done{0};
     std::mutex progress_mutex;
-    const auto castAndShade = [&](RayBatch& batch) {
+    const bool has_shadows = request.settings.shadows;
+    const auto castAndShade = [&](RayBatch& batch, ShadowRays& shadows) {
         batch.hits.resize(batch.rays.size());
         caster.cast(batch.rays.data(), batch.rays.size(), batch.hits.data(), footprint);
+        if (has_shadows) shadows.cast(batch.rays, batch.hits);
         for (size_t r = 0; r < batch.rays.size(); ++r) {
             const RayHit& hit = batch.hits[r];
             PixelSums& sum = *batch.sums[r];
@@ -72,7 +120,9 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
             sample.finish = hit.finish;
             sample.material = hit.material;
             sample.object = hit.object;
-            sum.add(sample, shade(sample, materials[hit.material], lighting, view));
+            shadows.select(r);
+            sum.add(sample, shade(sample, materials[hit.material], lighting, view,
+                                  has_shadows ? &shadows : nullptr));
             sum.points += 1.0f;
         }
         batch.rays.clear();
@@ -89,6 +139,7 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
         std::vector<PixelSums> sums(kTilePixels * kTilePixels);
         RayBatch batch;
         std::array<uint64_t, kLargestBlock * kLargestBlock> pixel_keys;
+        ShadowRays shadows(caster, lighting.suns);
         for (int by = y0; by < y1; by += side) {
             for (int bx = x0; bx < x1; bx += side) {
                 const int ex = std::min(bx + side, x1), ey = std::min(by + side, y1);
@@ -113,11 +164,11 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
                     }
                     if (batch.rays.size() < kBatchRays) continue;
                     if (request.cancel && request.cancel->requested) return;
-                    castAndShade(batch);
+                    castAndShade(batch, shadows);
                 }
             }
         }
-        castAndShade(batch);
+        castAndShade(batch, shadows);
         for (int y = y0; y < y1; ++y) {
             for (int x = x0; x < x1; ++x)
                 picture.write(x, y, sums[size_t(y - y0) * kTilePixels + size_t(x - x0)]);

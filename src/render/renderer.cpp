@@ -5,6 +5,7 @@
 #include <raster/rasterizer.h>
 #include <raycast/embree_raycaster.h>
 #include <render/raycast_method.h>
+#include <render/shadow_maps.h>
 #include <render/tile_loop.h>
 #include <sampling/random_sampler.h>
 
@@ -35,25 +36,43 @@ struct Renderer::Impl {
 
     Impl(const Scene& s, ThreadPool& p) : scene(s), pool(p), sampler(s) {}
 
+    // Rasterizes what the plan leaves to the z-buffer into `target`.
+    const RasterTarget* rasterizePlan(const View& view, const FramePlan& plan) {
+        if (plan.raster.draws.empty()) return nullptr;
+        if (!rasterizer) {
+            rasterizer = makeOsmesaRasterizer(rasterMeshes(scene), scene.materials, scene.textures,
+                                              pool.threadCount());
+        }
+        rasterizer->render(view, plan.raster, target);
+        return &target;
+    }
+
+    // Shadow maps, if asked for and anything casts shadows. Before the frame's own plan: the
+    // sampler has one at a time.
+    std::unique_ptr<SunVisibility> makeShadows(const FrameRequest& request, const View& view,
+                                               FrameStats& stats) {
+        if (!request.settings.shadows || scene.lighting.suns.empty()) return nullptr;
+        if (request.progress) request.progress("shadows", 0.0);
+        const auto rasterize = [&](const View& v, const FramePlan& plan) {
+            return rasterizePlan(v, plan);
+        };
+        return makeShadowMaps(scene, view, sampler, rasterize, pool, request, stats);
+    }
+
     // From the plan to the picture: large triangles to the z-buffer, points to the tiles, both into
     // one depth test.
     void drawPlan(const FrameRequest& request, const View& view, const FramePlan& plan,
-                  PointSource* source, Picture& picture, FrameStats& stats) {
+                  PointSource* source, const SunVisibility* shadows, Picture& picture,
+                  FrameStats& stats) {
         ReconstructionContext context;
         context.view = view;
         context.settings = request.settings;
         context.materials = &scene.materials;
         context.lighting = &scene.lighting;
+        context.sun_visibility = shadows;
         context.picture = &picture;
         const Stopwatch raster_watch;
-        if (!plan.raster.draws.empty()) {
-            if (!rasterizer) {
-                rasterizer = makeOsmesaRasterizer(rasterMeshes(scene), scene.materials,
-                                                  scene.textures, pool.threadCount());
-            }
-            rasterizer->render(view, plan.raster, target);
-            context.base = &target;
-        }
+        context.base = rasterizePlan(view, plan);
         stats.phases.emplace_back("raster", raster_watch.seconds());
         stats.large_triangles = plan.raster_triangles;
         const TriangleLookup triangle_lookup = [&](uint32_t number, float x, float y,
@@ -67,11 +86,12 @@ struct Renderer::Impl {
 
     void drawPoints(const FrameRequest& request, const View& view, Picture& picture,
                     FrameStats& stats) {
+        const std::unique_ptr<SunVisibility> shadows = makeShadows(request, view, stats);
         if (request.progress) request.progress("plan", 0.0);
         const Stopwatch plan_watch;
         const FramePlan& plan = sampler.plan(view, request.settings, pool, request.cancel);
         stats.phases.emplace_back("plan", plan_watch.seconds());
-        drawPlan(request, view, plan, &sampler, picture, stats);
+        drawPlan(request, view, plan, &sampler, shadows.get(), picture, stats);
         stats.cache_bytes = sampler.cacheBytes();
     }
 
@@ -86,10 +106,11 @@ struct Renderer::Impl {
                           triangles);
             throw Error(ErrorCode::kInvalidArgument, "", message);
         }
+        const std::unique_ptr<SunVisibility> shadows = makeShadows(request, view, stats);
         const Stopwatch plan_watch;
         const FramePlan plan = planFrame(scene, view, request.settings, true, pool, request.cancel);
         stats.phases.emplace_back("plan", plan_watch.seconds());
-        drawPlan(request, view, plan, nullptr, picture, stats);
+        drawPlan(request, view, plan, nullptr, shadows.get(), picture, stats);
     }
 
     void drawRaycast(const FrameRequest& request, const View& view, Picture& picture,

@@ -14,12 +14,14 @@ namespace {
 
 struct Tile {
     SubpixelRect inner, outer;
+    bool is_wanted = true;
     std::vector<uint32_t> batches;  // front to back
 };
 
-std::vector<Tile> makeTiles(const View& view, int tile_subpixels, int halo) {
+std::vector<Tile> makeTiles(const TileJob& job, int halo) {
+    const View& view = job.view;
     const int s = view.subpixels;
-    const int side = std::max(1, tile_subpixels / s) * s;
+    const int side = std::max(1, job.tile_size / s) * s;
     std::vector<Tile> tiles;
     for (int y = 0; y < view.subHeight(); y += side) {
         for (int x = 0; x < view.subWidth(); x += side) {
@@ -29,20 +31,22 @@ std::vector<Tile> makeTiles(const View& view, int tile_subpixels, int halo) {
             tile.outer = {std::max(0, x - halo), std::max(0, y - halo),
                           std::min(tile.inner.x1 + halo, view.subWidth()),
                           std::min(tile.inner.y1 + halo, view.subHeight())};
+            tile.is_wanted = !job.is_wanted || job.is_wanted(tile.inner);
             tiles.push_back(std::move(tile));
         }
     }
     return tiles;
 }
 
-void sortIntoTiles(const std::vector<Batch>& batches, const View& view, int tile_subpixels,
-                   int halo, std::vector<Tile>& tiles) {
+void sortIntoTiles(const TileJob& job, int halo, std::vector<Tile>& tiles) {
+    const std::vector<Batch>& batches = *job.batches;
+    const View& view = job.view;
     std::vector<uint32_t> order(batches.size());
     for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
     std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
         return batches[a].z_min != batches[b].z_min ? batches[a].z_min < batches[b].z_min : a < b;
     });
-    const int side = std::max(1, tile_subpixels / view.subpixels) * view.subpixels;
+    const int side = std::max(1, job.tile_size / view.subpixels) * view.subpixels;
     const int columns = (view.subWidth() + side - 1) / side,
               rows = (view.subHeight() + side - 1) / side;
     for (const uint32_t b : order) {
@@ -54,7 +58,7 @@ void sortIntoTiles(const std::vector<Batch>& batches, const View& view, int tile
         for (int y = y0; y <= y1; ++y) {
             for (int x = x0; x <= x1; ++x) {
                 Tile& tile = tiles[size_t(y) * columns + x];
-                if (tile.outer.overlaps(r)) tile.batches.push_back(b);
+                if (tile.is_wanted && tile.outer.overlaps(r)) tile.batches.push_back(b);
             }
         }
     }
@@ -96,27 +100,25 @@ struct Worker {
 
 }  // namespace
 
-void drawTiles(const ReconstructionContext& context, PointSource* source,
-               const std::vector<Batch>& batches, const TriangleLookup& triangle_lookup,
-               ThreadPool& pool, const FrameRequest& request, FrameStats& stats) {
-    const int halo = makeReconstruction(context)->halo();
-    std::vector<Tile> tiles = makeTiles(context.view, context.settings.tile_size, halo);
-    sortIntoTiles(batches, context.view, context.settings.tile_size, halo, tiles);
+TileTimes runTiles(const TileJob& job, ThreadPool& pool, const FrameRequest& request,
+                   FrameStats& stats) {
+    const int halo = job.makeReconstruction()->halo();
+    std::vector<Tile> tiles = makeTiles(job, halo);
+    sortIntoTiles(job, halo, tiles);
 
-    if (request.progress) request.progress("draw", 0.0);
     std::vector<Worker> workers(pool.threadCount());
     std::vector<double> culled(tiles.size());  // not by worker: the same sum for any threads
     std::atomic<size_t> done{0};
     std::mutex progress_mutex;
     pool.forEach(tiles.size(), [&](size_t t, int thread) {
-        if (request.cancel && request.cancel->requested) return;
+        if (!tiles[t].is_wanted || (request.cancel && request.cancel->requested)) return;
         Worker& worker = workers[thread];
         if (!worker.reconstruction) {
-            worker.reconstruction = makeReconstruction(context);
-            if (source) worker.emitter = source->makeEmitter();
+            worker.reconstruction = job.makeReconstruction();
+            if (job.source) worker.emitter = job.source->makeEmitter();
         }
         TileReconstruction& reconstruction = *worker.reconstruction;
-        const NumberLookup lookup(worker.emitter.get(), triangle_lookup);
+        const NumberLookup lookup(worker.emitter.get(), *job.triangle_lookup);
         const Tile& tile = tiles[t];
 
         const Stopwatch draw_watch;
@@ -125,10 +127,11 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
             reconstruction.beginPass(pass, lookup);
             for (const uint32_t b : tile.batches) {
                 if (request.cancel && request.cancel->requested) return;
-                if (reconstruction.hides(batches[b].rect, batches[b].z_min, false)) {
-                    if (pass == 0) culled[t] += expectedPoints(batches[b], tile.inner);
+                const Batch& batch = (*job.batches)[b];
+                if (reconstruction.hides(batch.rect, batch.z_min, false)) {
+                    if (pass == 0) culled[t] += expectedPoints(batch, tile.inner);
                 } else {
-                    worker.emitter->emit(batches[b], reconstruction);
+                    worker.emitter->emit(batch, reconstruction);
                 }
             }
         }
@@ -141,27 +144,42 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
         const size_t n = ++done;
         if (request.progress && n % 4 == 0) {
             const std::lock_guard lock(progress_mutex);
-            request.progress("draw", double(n) / double(tiles.size()));
+            request.progress(job.phase, double(n) / double(tiles.size()));
         }
     });
     if (request.cancel && request.cancel->requested)
         throw Error(ErrorCode::kCancelled, "", "cancelled");
 
-    double draw = 0.0, finish = 0.0;
+    TileTimes times;
     for (const Worker& worker : workers) {
         if (!worker.reconstruction) continue;
         const TileCounters counters = worker.reconstruction->counters();
         stats.points_drawn += counters.points_drawn;
         stats.points_kept += counters.points_kept;
         stats.small_triangles += counters.triangles;
-        draw += worker.draw_seconds;
-        finish += worker.finish_seconds;
+        times.draw += worker.draw_seconds;
+        times.finish += worker.finish_seconds;
     }
     stats.points_culled +=
         uint64_t(std::llround(std::accumulate(culled.begin(), culled.end(), 0.0)));
+    return times;
+}
+
+void drawTiles(const ReconstructionContext& context, PointSource* source,
+               const std::vector<Batch>& batches, const TriangleLookup& triangle_lookup,
+               ThreadPool& pool, const FrameRequest& request, FrameStats& stats) {
+    if (request.progress) request.progress("draw", 0.0);
+    TileJob job;
+    job.view = context.view;
+    job.tile_size = context.settings.tile_size;
+    job.makeReconstruction = [&] { return makeReconstruction(context); };
+    job.source = source;
+    job.batches = &batches;
+    job.triangle_lookup = &triangle_lookup;
+    const TileTimes times = runTiles(job, pool, request, stats);
     stats.batches = batches.size();
-    stats.phases.emplace_back("draw", draw / pool.threadCount());
-    stats.phases.emplace_back("reconstruct", finish / pool.threadCount());
+    stats.phases.emplace_back("draw", times.draw / pool.threadCount());
+    stats.phases.emplace_back("reconstruct", times.finish / pool.threadCount());
 }
 
 }  // namespace stipple

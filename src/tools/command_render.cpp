@@ -177,10 +177,7 @@ RenderSettings effectiveSettings(const RenderOptions& options, const Scene& scen
         applySetting(settings, key, value, scene.path);
     options.settings.apply(settings);
     // Better refused than ignored.
-    if (settings.shadows || settings.ao) {
-        throw Error(ErrorCode::kInvalidArgument, settings.shadows ? "--shadows" : "--ao",
-                    "is not yet available");
-    }
+    if (settings.ao) throw Error(ErrorCode::kInvalidArgument, "--ao", "is not yet available");
     return settings;
 }
 

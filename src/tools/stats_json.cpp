@@ -84,8 +84,11 @@ std::string statsJson(const RunStats& stats) {
     json["counters"] = {
         {"points_drawn", frame.points_drawn},       {"points_kept", frame.points_kept},
         {"points_culled", frame.points_culled},     {"batches", frame.batches},
-        {"large_triangles", frame.large_triangles}, {"overestimation", frame.overestimation}};
-    json["memory"] = {{"peak_bytes", peakMemoryBytes()}, {"cache_bytes", frame.cache_bytes}};
+        {"large_triangles", frame.large_triangles}, {"overestimation", frame.overestimation},
+        {"shadow_points", frame.shadow_points}};
+    json["memory"] = {{"peak_bytes", peakMemoryBytes()},
+                      {"cache_bytes", frame.cache_bytes},
+                      {"shadow_bytes", frame.shadow_bytes}};
     json["frames"] = Json::array();
     for (const FrameStats& f : stats.frames) json["frames"].push_back(f.seconds);
     json["warnings"] = stats.warnings;

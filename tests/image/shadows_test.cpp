@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+// Shadow maps against shadow rays: edges where they belong, nothing lit in the shade and no shade
+// in the light; the same bits for any number of threads.
+#include <gtest/gtest.h>
+#include <render/compare.h>
+#include <render/renderer.h>
+#include <scenegraph/procedural/generators.h>
+
+namespace stipple {
+namespace {
+
+constexpr int kWidth = 320, kHeight = 200;
+
+uint32_t addMesh(Scene& scene, GeneratedMesh made) {
+    for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(m + scene.materials.size());
+    scene.materials.insert(scene.materials.end(), made.materials.begin(), made.materials.end());
+    scene.meshes.push_back(std::move(made.mesh));
+    return uint32_t(scene.meshes.size() - 1);
+}
+
+Affine placed(const DVec3& at, const DVec3& size, double turn = 0.0) {
+    Affine a;
+    a.linear =
+        DMat3(std::cos(turn), 0, -std::sin(turn), 0, 1, 0, std::sin(turn), 0, std::cos(turn));
+    for (int i = 0; i < 3; ++i) a.linear[i] *= size[i];
+    a.translation = at;
+    return a;
+}
+
+// A plane, and what stands on it.
+struct TestScene {
+    Scene scene;
+    Group root;
+
+    explicit TestScene(const Vec3& to_sun) {
+        scene.path = "test";
+        scene.lighting.suns.push_back({glm::normalize(to_sun), Vec3(3.0f)});
+        root.instances = InstanceStore(DBox3{DVec3(-500), DVec3(500)});
+        add(makePrimitive("plane", 2, Vec3(0.5f)), placed(DVec3(0.0), DVec3(400.0)));
+    }
+    void add(GeneratedMesh mesh, const Affine& at) {
+        root.instances.add(ChildRef::mesh(addMesh(scene, std::move(mesh))), at);
+    }
+    Scene& build() {
+        scene.root = uint32_t(scene.groups.size());
+        scene.groups.push_back(root);
+        ThreadPool pool(2);
+        buildScene(scene, pool);
+        return scene;
+    }
+};
+
+FrameRequest request(const DVec3& eye = DVec3(3, 4, 9)) {
+    FrameRequest r;
+    r.camera = lookAt(eye, DVec3(0, 0.6, 0));
+    r.settings.width = kWidth;
+    r.settings.height = kHeight;
+    return r;
+}
+
+Image render(const Scene& scene, FrameRequest r, Method method, bool shadows, int threads = 2) {
+    r.settings.method = method;
+    r.settings.shadows = shadows;
+    if (method == Method::kRaycast) r.settings.samples = 16;
+    ThreadPool pool(threads);
+    return Renderer(scene, pool).render(r).image;
+}
+
+// Whether the green channel differs by no more than `tolerance` within `radius` pixels.
+bool isEven(const Image& image, int x, int y, int radius, float tolerance) {
+    float low = kInfinity, high = -kInfinity;
+    for (int v = std::max(y - radius, 0); v <= std::min(y + radius, kHeight - 1); ++v) {
+        for (int u = std::max(x - radius, 0); u <= std::min(x + radius, kWidth - 1); ++u) {
+            low = std::min(low, image.pixel(u, v)[1]);
+            high = std::max(high, image.pixel(u, v)[1]);
+        }
+    }
+    return high - low <= tolerance * high;
+}
+
+class ShadowOfBox : public testing::TestWithParam<float> {};
+
+// An edge farther off than 1.5 pixels would show in a pixel whose neighbours, two pixels around,
+// are all lit or all in the shade; so would light under the box, or false shadow on the plane.
+TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
+    TestScene t(Vec3(-1.0f, GetParam(), 0.3f));
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), DVec3(3.0), 0.5));
+    const Scene& scene = t.build();
+    const Image rays = render(scene, request(), Method::kRaycast, true);
+    const Image open = render(scene, request(), Method::kRaycast, false);
+    for (const Method method : {Method::kPoints, Method::kZBuffer}) {
+        const Image maps = render(scene, request(), method, true);
+        int lit = 0, shaded = 0, wrong = 0;
+        for (int y = 0; y < kHeight; ++y) {
+            for (int x = 0; x < kWidth; ++x) {
+                const float expected = rays.pixel(x, y)[1], unshaded = open.pixel(x, y)[1];
+                if (!isEven(rays, x, y, 2, 0.05f) || !isEven(open, x, y, 2, 0.05f)) continue;
+                (expected < 0.9f * unshaded ? shaded : lit) += 1;
+                wrong += std::abs(maps.pixel(x, y)[1] - expected) > 0.03f * expected;
+            }
+        }
+        EXPECT_GT(lit, 20000);
+        EXPECT_GT(shaded, 400);
+        EXPECT_EQ(wrong, 0);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(heights, ShadowOfBox, testing::Values(2.0f, 0.7f, 0.25f));
+
+// A ball's lit side has no shadow of its own, and its far side no light, but for the pixels where
+// the light grazes it.
+TEST(Shadows, curvedSurfacesHaveNoAcne) {
+    TestScene t(Vec3(-1.0f, 0.8f, 0.6f));
+    t.add(makePrimitive("sphere", 80000, Vec3(0.6f)), placed(DVec3(0, 1.2, 0), DVec3(2.4)));
+    const Scene& scene = t.build();
+    FrameRequest r = request();
+    r.aovs = {"normal"};
+    const Image rays = render(scene, r, Method::kRaycast, true);
+    const Image open = render(scene, r, Method::kRaycast, false);
+    const Image maps = render(scene, r, Method::kPoints, true);
+    const int up = rays.channelIndex("normal.Y");
+    ASSERT_GE(up, 0);
+    int compared = 0;
+    for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+            const float expected = rays.pixel(x, y)[1];
+            const bool is_plane = rays.pixel(x, y)[up] > 0.999f;
+            if (is_plane || !isEven(rays, x, y, 2, 0.2f) || !isEven(open, x, y, 2, 0.2f)) continue;
+            ++compared;
+            EXPECT_NEAR(maps.pixel(x, y)[1], expected, 0.04f * expected) << x << ", " << y;
+        }
+    }
+    EXPECT_GT(compared, 2000);
+}
+
+TEST(Shadows, whatStandsBehindTheCameraShadesWhatItSees) {
+    TestScene t(Vec3(0.0f, 0.5f, 1.0f));  // from behind the camera
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 40, 60), DVec3(200, 80, 2)));
+    const Scene& scene = t.build();
+    const Image rays = render(scene, request(), Method::kRaycast, true);
+    const Image open = render(scene, request(), Method::kPoints, false);
+    const Image maps = render(scene, request(), Method::kPoints, true);
+    const int x = kWidth / 2, y = kHeight * 3 / 4;
+    EXPECT_LT(rays.pixel(x, y)[1], 0.8f * open.pixel(x, y)[1]);
+    EXPECT_NEAR(maps.pixel(x, y)[1], rays.pixel(x, y)[1], 0.01f * rays.pixel(x, y)[1]);
+}
+
+// Trees in a group that is placed twice, or the same trees in one flat group.
+Scene wood(bool is_nested) {
+    TestScene t(Vec3(-1.0f, 0.9f, 0.4f));
+    TreeParams params;
+    params.triangles = 4000;
+    const uint32_t tree = addMesh(t.scene, makeTree(params));
+    Group stand;
+    stand.instances = InstanceStore(DBox3{DVec3(-200), DVec3(200)});
+    for (int i = 0; i < 100; ++i) {
+        stand.instances.add(
+            ChildRef::mesh(tree),
+            placed(DVec3(7.0 * (i % 10) - 35.0, 0.0, -7.0 * (i / 10)), DVec3(1.0), 2.4 * i));
+    }
+    if (is_nested) t.scene.groups.push_back(stand);
+    for (const double x : {-40.0, 40.0}) {
+        const Affine at = placed(DVec3(x, 0, 0), DVec3(1.0), x > 0.0 ? 0.3 : 0.0);
+        if (is_nested) {
+            t.root.instances.add(ChildRef::group(0), at);
+        } else {
+            for (uint32_t i = 0; i < 100; ++i)
+                t.root.instances.add(ChildRef::mesh(tree), at * stand.instances.groupFromChild(i));
+        }
+    }
+    return t.build();
+}
+
+FrameRequest woodRequest() {
+    FrameRequest r;
+    r.camera = lookAt(DVec3(0, 60, 110), DVec3(0, 6, -20));
+    r.settings.width = kWidth;
+    r.settings.height = kHeight;
+    return r;
+}
+
+TEST(Shadows, raysFindCastersInNestedGroups) {
+    const Image nested = render(wood(true), woodRequest(), Method::kRaycast, true);
+    const Image flat = render(wood(false), woodRequest(), Method::kRaycast, true);
+    ThreadPool pool(2);
+    EXPECT_GT(compareImages(nested, flat, pool).psnr, 45.0);
+}
+
+TEST(Shadows, treesAreAsBrightAsByRays) {
+    const Scene scene = wood(true);
+    const Image rays = render(scene, woodRequest(), Method::kRaycast, true);
+    const Image maps = render(scene, woodRequest(), Method::kPoints, true);
+    ThreadPool pool(2);
+    const TileMeans means = tileMeans(maps, rays);
+    EXPECT_NEAR(means.mean, 0.0, 0.01);
+    EXPECT_LT(means.rms, 0.03);
+    EXPECT_GT(compareImages(maps, rays, pool).psnr, 28.0);
+    const TileMeans without =
+        tileMeans(render(scene, woodRequest(), Method::kRaycast, false), rays);
+    EXPECT_GT(without.mean, 0.05);  // there is something to see
+}
+
+TEST(Shadows, sameBitsForAnyNumberOfThreads) {
+    const Scene scene = wood(true);
+    for (const Method method : {Method::kPoints, Method::kRaycast}) {
+        const Image one = render(scene, woodRequest(), method, true, 1);
+        EXPECT_EQ(one.data, render(scene, woodRequest(), method, true, 3).data);
+    }
+}
+
+// Texels lie still in the world: where the camera goes aside by whole pixels, so does the picture.
+TEST(Shadows, doNotSwimWhenTheCameraMoves) {
+    TestScene t(Vec3(-1.0f, 0.7f, 0.3f));
+    TreeParams params;
+    params.triangles = 4000;
+    params.height = 6.0;
+    t.add(makeTree(params), placed(DVec3(0.0), DVec3(1.0)));
+    const Scene& scene = t.build();
+    FrameRequest r = request();
+    r.camera = lookAt(DVec3(0, 30, 0), DVec3(0.0), DVec3(0, 0, -1));
+    r.camera.orthographic = true;
+    r.camera.height = 10.0;
+    const Image before = render(scene, r, Method::kZBuffer, true);
+    constexpr int kMoved = 7;  // pixels
+    r.camera.eye += r.camera.world_from_camera[0] * (kMoved * r.camera.height / kHeight);
+    const Image after = render(scene, r, Method::kZBuffer, true);
+    int changed = 0, shaded = 0;
+    const float lit = before.pixel(2, 2)[1];
+    for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x + kMoved < kWidth; ++x) {
+            const float was = before.pixel(x + kMoved, y)[1];
+            shaded += was < 0.9f * lit;
+            changed += std::abs(after.pixel(x, y)[1] - was) > 0.01f * was;
+        }
+    }
+    EXPECT_GT(shaded, 2000);
+    EXPECT_LT(changed, shaded / 100);
+}
+
+TEST(Shadows, everyReconstructionTakesThem) {
+    TestScene t(Vec3(-1.0f, 0.7f, 0.3f));
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 0.75, 0), DVec3(1.5), 0.5));
+    const Scene& scene = t.build();
+    const Image rays = render(scene, request(), Method::kRaycast, true);
+    ThreadPool pool(2);
+    for (const Reconstruct reconstruct :
+         {Reconstruct::kSplat, Reconstruct::kGaussian, Reconstruct::kPullPush, Reconstruct::kEwa}) {
+        FrameRequest r = request();
+        r.settings.reconstruct = reconstruct;
+        EXPECT_GT(compareImages(render(scene, r, Method::kPoints, true), rays, pool).psnr, 28.0);
+    }
+}
+
+}  // namespace
+}  // namespace stipple
