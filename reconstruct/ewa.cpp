@@ -148,8 +148,7 @@ private:
         visitEllipse(e.center, v, 1.0f, rect.x0, rect.y0, rect.x1, rect.y1,
                      [&](int x, int y, const Vec2& d, float) {
                          uint64_t& key = front_.row(y)[x];
-                         key = std::min(key, DepthTile::pack(planeDepth(context_.view, e, d),
-                                                             block.number[i]));
+                         key = std::min(key, pointKey(block, i, planeDepth(context_.view, e, d)));
                      });
         discs_since_refresh_ += 4;
         if (int64_t(discs_since_refresh_) > int64_t(rect.width()) * rect.height()) {

@@ -134,6 +134,33 @@ TEST(ReconstructMethods, surfacesCloseAtHalfAPointASubpixel) {
     }
 }
 
+// Pixels of a red surface through which a green one behind it is seen.
+int pixelsSeenThrough(const TestFrame& frame) {
+    std::vector<TestPoint> points;
+    frame.addPlane(points, -4, 64, -4, 44, 300.0f, 0.0f, 1, 11, true);
+    frame.addPlane(points, -4, 64, -4, 44, 100.0f, 0.3f, 0, 13, true);
+    const Image image = frame.draw(points);
+    int through = 0;
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) through += image.pixel(x, y)[1] > 0.1f;
+    }
+    return through;
+}
+
+TEST(ReconstructMethods, fillingClosesHolesOfAPixel) {
+    TestFrame frame;
+    frame.settings.subpixels = 2;
+    for (const Reconstruct method : {Reconstruct::kPerPixel, Reconstruct::kEwa}) {
+        frame.settings.reconstruct = method;
+        frame.settings.samples = method == Reconstruct::kPerPixel ? 1.5 : 1.0;
+        frame.settings.fill = false;
+        const int open = pixelsSeenThrough(frame);
+        EXPECT_GE(open, 8) << nameOf(frame);
+        frame.settings.fill = true;
+        EXPECT_LE(pixelsSeenThrough(frame) * 4, open) << nameOf(frame);
+    }
+}
+
 TEST(ReconstructMethods, noHolesWhereTwoLevelsMeet) {
     TestFrame frame;
     frame.settings.reconstruct = Reconstruct::kPullPush;
