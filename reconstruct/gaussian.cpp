@@ -74,10 +74,7 @@ public:
     const SubpixelRect& region() const override { return pass_ == 0 ? tile_.rect() : shaded_.rect; }
 
     bool take(const PointBlock& block) override {
-        if (pass_ == 0) {
-            split_.take(block, tile_, surfaces_);
-            return true;
-        }
+        if (pass_ == 0) return split_.take(block, tile_, surfaces_).is_used;
         average(block);
         return false;
     }

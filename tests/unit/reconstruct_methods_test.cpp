@@ -223,6 +223,51 @@ TEST(ReconstructMethods, splatsOfTheWorldShrinkWithDistance) {
     EXPECT_EQ(pass.sideAt(1e-3f), 32);
 }
 
+// 64 points on one place, turned to the eye.
+PointBlock blockAt(float x, float y, float z, float area) {
+    PointBlock block;
+    block.count = kBlockPoints;
+    for (int i = 0; i < kBlockPoints + kBlockPadding; ++i) {
+        block.x[i] = x, block.y[i] = y, block.z[i] = z;
+        block.number[i] = uint32_t(i);
+        block.keep[i] = 1;
+        block.width[i] = patchWidthCode(1e4f, kFirstSubpixelExponent);
+        block.normal_x[i] = block.normal_y[i] = 0.0f, block.normal_z[i] = -1.0f;
+        block.area[i] = area;
+    }
+    return block;
+}
+
+TEST(ReconstructMethods, blocksThatShowNothingAreGivenBack) {
+    class NoLookup : public SampleLookup {
+        void lookUp(uint32_t, float, float, SurfaceSample&) const override {}
+    } no_lookup;
+    for (const Reconstruct method : kAll) {
+        TestFrame frame;
+        frame.settings.reconstruct = method;
+        frame.settings.culling = false;
+        Picture picture(frame.view(), frame.lighting, {}, false);
+        ReconstructionContext context;
+        context.view = frame.view();
+        context.settings = frame.settings;
+        context.lighting = &frame.lighting;
+        context.materials = &frame.materials;
+        context.picture = &picture;
+        const auto reconstruction = makeReconstruction(context);
+        const SubpixelRect all{0, 0, context.view.subWidth(), context.view.subHeight()};
+        reconstruction->beginTile(all, all);
+        reconstruction->beginPass(0, no_lookup);
+        const float area = 1.0f / 16.0f;
+        EXPECT_TRUE(reconstruction->take(blockAt(0.6f, 0.6f, 100.0f, area))) << nameOf(frame);
+        EXPECT_FALSE(reconstruction->take(blockAt(0.6f, 0.6f, 200.0f, area))) << nameOf(frame);
+        EXPECT_TRUE(reconstruction->take(blockAt(9.6f, 0.6f, 200.0f, area))) << nameOf(frame);
+        if (method != Reconstruct::kEwa) continue;
+        // The subpixel it hits shows something nearer, but its disc reaches beyond.
+        EXPECT_TRUE(reconstruction->take(blockAt(4.6f, 0.6f, 50.0f, 0.01f * area)));
+        EXPECT_TRUE(reconstruction->take(blockAt(4.6f, 0.6f, 90.0f, area)));
+    }
+}
+
 TEST(ReconstructMethods, drawnSettingsKeepThePoints) {
     RenderSettings settings;
     settings.reconstruct = Reconstruct::kGaussian;
