@@ -67,15 +67,19 @@ TEST(ReconstructMethods, aStraightEdgeIsWhereThePointsEnd) {
                            : method == Reconstruct::kPullPush ? 0.125f + 0.125f
                                                               : 0.13f;
         for (const float edge : {30.0f, 30.4f, 30.75f}) {
-            TestFrame frame;
-            frame.settings.reconstruct = method;
-            frame.settings.samples = 2;
-            frame.settings.splat_size = 0.75;
-            std::vector<TestPoint> points;
-            frame.addPlane(points, -4, edge, -4, 44, 100.0f, 0.0f, 0, 3);
-            const Image image = frame.draw(points);
-            EXPECT_NEAR(coveredWidth(image, image.channelIndex("coverage")), edge, most)
-                << nameOf(frame) << " edge " << edge;
+            // Splats of three subpixels and of about four.
+            for (const double splat_size : {0.75, 1.0}) {
+                if (splat_size != 0.75 && method != Reconstruct::kSplat) continue;
+                TestFrame frame;
+                frame.settings.reconstruct = method;
+                frame.settings.samples = 2;
+                frame.settings.splat_size = splat_size;
+                std::vector<TestPoint> points;
+                frame.addPlane(points, -4, edge, -4, 44, 100.0f, 0.0f, 0, 3);
+                const Image image = frame.draw(points);
+                EXPECT_NEAR(coveredWidth(image, image.channelIndex("coverage")), edge, most)
+                    << nameOf(frame) << " edge " << edge << " splats of " << splat_size;
+            }
         }
     }
 }
@@ -215,12 +219,12 @@ TEST(ReconstructMethods, splatsOfTheWorldShrinkWithDistance) {
     context.view = frame.view();
     context.settings = frame.settings;
     context.picture = &picture;
-    const DepthPass pass(context, 32);
+    const DepthPass pass(context, 33);
     const float focal = float(context.view.focal);
-    EXPECT_EQ(pass.sideAt(focal / 8.0f), 8);
+    EXPECT_EQ(pass.sideAt(focal / 8.5f), 9);
     EXPECT_EQ(pass.sideAt(focal / 3.0f), 3);
     EXPECT_EQ(pass.sideAt(1e6f), 1);
-    EXPECT_EQ(pass.sideAt(1e-3f), 32);
+    EXPECT_EQ(pass.sideAt(1e-3f), 33);
 }
 
 // 64 points on one place, turned to the eye.
