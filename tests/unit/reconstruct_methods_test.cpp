@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 #include <reconstruct/depth_pass.h>
+#include <reconstruct/subpixel_shader.h>
 
 namespace stipple {
 namespace {
@@ -270,6 +271,33 @@ TEST(ReconstructMethods, blocksThatShowNothingAreGivenBack) {
         EXPECT_TRUE(reconstruction->take(blockAt(4.6f, 0.6f, 50.0f, 0.01f * area)));
         EXPECT_TRUE(reconstruction->take(blockAt(4.6f, 0.6f, 90.0f, area)));
     }
+}
+
+TEST(ReconstructMethods, onePointAtTwoDepthsIsSeenAtBoth) {
+    // Looked up once, shaded where it is seen: haze tells the depth.
+    class Lookup : public SampleLookup {
+    public:
+        mutable int count = 0;
+        void lookUp(uint32_t, float, float, SurfaceSample& sample) const override {
+            sample.albedo = Vec3(0.5f);
+            ++count;
+        }
+    } lookup;
+    TestFrame frame;
+    frame.lighting.sky.horizon = Vec3(1.0f);
+    frame.lighting.sky.haze_distance = 100.0f;
+    ReconstructionContext context;
+    context.view = frame.view();
+    context.materials = &frame.materials;
+    context.lighting = &frame.lighting;
+    SubpixelShader shader(context), fresh(context);
+    shader.show(lookup, DepthTile::pack(50.0f, 7), 8, 8);
+    shader.show(lookup, DepthTile::pack(200.0f, 7), 9, 8);
+    EXPECT_EQ(lookup.count, 1);
+    fresh.show(lookup, DepthTile::pack(200.0f, 7), 9, 8);
+    EXPECT_EQ(shader.sample().depth, 200.0f);
+    EXPECT_EQ(shader.sample().position_camera, fresh.sample().position_camera);
+    EXPECT_EQ(shader.radiance(), fresh.radiance());
 }
 
 TEST(ReconstructMethods, drawnSettingsKeepThePoints) {
