@@ -123,8 +123,7 @@ bool DepthPass::take(const PointBlock& block, DepthTile& tile) {
     bool is_used = false;
     for (int k = 0; k < n_covering; ++k) {
         const int i = covering[k];
-        const uint32_t surface = block.width[i] >= kSurfaceCode ? kSurfaceBit : 0;
-        const uint64_t key = DepthTile::pack(block.z[i], block.number[i] | surface);
+        const uint64_t key = pointKey(block, i, block.z[i]);
         if (placed.covers[i] & kWide) {
             is_used |= splat(tile, placed.x[i], placed.y[i], key, sideAt(block.z[i]));
         } else {

@@ -9,10 +9,14 @@
 
 namespace stipple {
 
+// Side of a square splat, subpixels: the nearest odd number. Erosion takes back as much on each
+// side as a splat adds only if its middle is the subpixel that the point lies in.
+inline int splatSide(float side) { return 2 * int(0.5f * side) + 1; }
+
 class DepthPass {
 public:
-    // splat_subpixels: side of the square of constant depth that a point covers; 0: chosen by the
-    // patch it lies on (footprint.h).
+    // splat_subpixels: side of the square of constant depth that a point covers, odd where it is to
+    // be eroded; 0: chosen by the patch it lies on (footprint.h).
     DepthPass(const ReconstructionContext& context, int splat_subpixels);
     void begin(const SubpixelRect& inner);
     // False if none of the block is in front.
@@ -24,7 +28,7 @@ public:
         if (!(splat_world_ > 0.0f)) return side_;
         const float side =
             splat_world_ * float(context_.view.focal) / (context_.view.orthographic ? 1.0f : z);
-        return std::clamp(int(std::min(side, float(side_)) + 0.5f), 1, side_);
+        return std::min(splatSide(std::min(side, float(side_))), side_);
     }
     // How many subpixels beyond the one it lies in a point may cover.
     int reach(bool narrow) const { return narrow && !is_splat_ ? 0 : side_ / 2; }

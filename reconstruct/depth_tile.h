@@ -74,4 +74,11 @@ private:
     std::vector<float> farthest_;
 };
 
+// Key of point i of a block where it covers a subpixel at that depth: says whether the point lies
+// on a surface whose holes are to be closed.
+inline uint64_t pointKey(const PointBlock& block, int i, float depth) {
+    const uint32_t surface = block.width[i] >= kSurfaceCode ? kSurfaceBit : 0;
+    return DepthTile::pack(depth, block.number[i] | surface);
+}
+
 }  // namespace stipple

@@ -38,4 +38,24 @@ void erodeSplats(const DepthTile& tile, const std::function<int(float depth)>& r
     }
 }
 
+void farthestWithin(const DepthTile& tile, int reach, std::vector<uint64_t>& farthest) {
+    const int width = tile.rect().width(), height = tile.rect().height();
+    const size_t stride = size_t(tile.stride());
+    std::vector<uint64_t> along_y(stride);
+    farthest.assign(tile.keys().size(), 0);
+    for (int y = 0; y < height; ++y) {
+        std::fill(along_y.begin(), along_y.end(), 0);
+        for (int ny = std::max(y - reach, 0); ny <= std::min(y + reach, height - 1); ++ny) {
+            const uint64_t* row = tile.keys().data() + size_t(ny) * stride;
+            for (int x = 0; x < width; ++x)
+                along_y[size_t(x)] = std::max(along_y[size_t(x)], row[x]);
+        }
+        uint64_t* to = farthest.data() + size_t(y) * stride;
+        for (int k = -reach; k <= reach; ++k) {
+            for (int x = std::max(0, -k); x < std::min(width, width - k); ++x)
+                to[x] = std::max(to[x], along_y[size_t(x + k)]);
+        }
+    }
+}
+
 }  // namespace stipple

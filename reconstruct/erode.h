@@ -19,4 +19,8 @@ namespace stipple {
 void erodeSplats(const DepthTile& tile, const std::function<int(float depth)>& reach,
                  std::vector<uint64_t>& eroded);
 
+// farthest: becomes the largest key of the square of subpixels within `reach` of each, as far as
+// the tile has them; laid out as the tile's keys. Takes time proportional to subpixels x reach.
+void farthestWithin(const DepthTile& tile, int reach, std::vector<uint64_t>& farthest);
+
 }  // namespace stipple

@@ -99,12 +99,12 @@ public:
             }
             return false;
         }
-        if (split_.take(block, hits_, hits_) > 0) {
-            for (int i = 0; i < block.count; ++i) {
-                if (block.keep[i] && split_.isWide(block.width[i])) drawDisc(block, i);
-            }
+        const SplitPass::Taken taken = split_.take(block, hits_, hits_);
+        bool is_used = taken.is_used;
+        for (int i = 0; taken.wide > 0 && i < block.count; ++i) {
+            if (block.keep[i] && split_.isWide(block.width[i])) is_used |= drawDisc(block, i);
         }
-        return true;
+        return is_used;
     }
     bool take(const TriangleBlock& block) override {
         return pass_ == 0 && split_.take(block, hits_);
@@ -140,7 +140,9 @@ private:
         return std::min(block.area[i], most_projected_ / projected);
     }
 
-    void drawDisc(const PointBlock& block, int i) {
+    // False if none of it is in front.
+    bool drawDisc(const PointBlock& block, int i) {
+        bool is_used = false;
         const Ellipse e = ellipseOf(block, i);
         const SubpixelRect& rect = front_.rect();
         const Variance v =
@@ -148,14 +150,17 @@ private:
         visitEllipse(e.center, v, 1.0f, rect.x0, rect.y0, rect.x1, rect.y1,
                      [&](int x, int y, const Vec2& d, float) {
                          uint64_t& key = front_.row(y)[x];
-                         key = std::min(key, DepthTile::pack(planeDepth(context_.view, e, d),
-                                                             block.number[i]));
+                         const uint64_t of_disc =
+                             pointKey(block, i, planeDepth(context_.view, e, d));
+                         is_used |= of_disc < key;
+                         key = std::min(key, of_disc);
                      });
         discs_since_refresh_ += 4;
         if (int64_t(discs_since_refresh_) > int64_t(rect.width()) * rect.height()) {
             front_.refreshHidden();
             discs_since_refresh_ = 0;
         }
+        return is_used;
     }
 
     bool isOnFront(float depth, uint64_t front, uint8_t width_code) const {

@@ -33,8 +33,8 @@ public:
 
     int passCount() const override { return 2; }
     // Filling looks two subpixels around, twice, and erosion as far as points reach, at what points
-    // reach from further away.
-    int halo() const override { return filter_.margin() + 4 + 2 * split_.reach(false); }
+    // reach from further away, or at what covers them there.
+    int halo() const override { return filter_.margin() + 5 + 2 * split_.reach(false); }
 
     void beginTile(const SubpixelRect& inner, const SubpixelRect& outer) override {
         inner_ = inner;
@@ -64,17 +64,17 @@ public:
         const auto grown = [&](int by) {
             return SubpixelRect{rect.x0 - by, rect.y0 - by, rect.x1 + by, rect.y1 + by};
         };
-        const int reach = split_.reach(narrow);
-        // Erosion shows nothing farther than what is there within the reach of a square.
-        return tile_.hides(grown(reach), z_min) || surfaces_.hides(grown(reach + side_ / 2), z_min);
+        // Narrow points go into tile_ alone, each into its own subpixel.
+        if (narrow) return tile_.hides(rect, z_min) || surfaces_.hides(grown(side_ / 2), z_min);
+        // Erosion shows nothing farther than what is there within the reach of a square, and
+        // surfaces behind all that tile_ shows so far around are dropped before.
+        const SubpixelRect around = grown(split_.reach(false) + side_ / 2);
+        return tile_.hides(around, z_min) || surfaces_.hides(around, z_min);
     }
     const SubpixelRect& region() const override { return pass_ == 0 ? tile_.rect() : shaded_.rect; }
 
     bool take(const PointBlock& block) override {
-        if (pass_ == 0) {
-            split_.take(block, tile_, surfaces_);
-            return true;
-        }
+        if (pass_ == 0) return split_.take(block, tile_, surfaces_).is_used;
         average(block);
         return false;
     }
@@ -96,8 +96,9 @@ private:
     // A patch at least this many squares wide is a surface.
     static constexpr float kWideInSides = 4.0f;
 
-    // Large surfaces, eroded, into tile_.
+    // Large surfaces, eroded, into tile_. What hides() lets be left out must change nothing here.
     void closeSurfaces() {
+        dropHiddenSurfaces();
         // A surface may go on in triangles.
         for (size_t i = 0; i < tile_.keys().size(); ++i) {
             const uint64_t key = tile_.keys()[i];
@@ -113,10 +114,20 @@ private:
             const uint64_t near_key = surfaces_.keys()[i], far_key = scratch_[i];
             // Points all around: a surface goes on here, and must not sink below a triangle close
             // behind it for the depth that it gains within a square.
-            const bool is_within =
-                far_key != DepthTile::kEmpty && !(DepthTile::numberOf(far_key) & kAnyTriangle) &&
-                DepthTile::numberOf(key) != kNoNumber && DepthTile::numberOf(key) & kAnyTriangle;
+            const bool is_within = key < far_key && far_key != DepthTile::kEmpty &&
+                                   !(DepthTile::numberOf(far_key) & kAnyTriangle) &&
+                                   DepthTile::numberOf(key) & kAnyTriangle;
             key = std::min(key, is_within ? near_key : far_key);
+        }
+    }
+
+    // Surfaces behind all that tile_ shows within half a square are not seen wherever erosion might
+    // show them.
+    void dropHiddenSurfaces() {
+        farthestWithin(tile_, side_ / 2, scratch_);
+        for (size_t i = 0; i < scratch_.size(); ++i) {
+            uint64_t& key = surfaces_.keys()[i];
+            if (DepthTile::depthOf(key) > DepthTile::depthOf(scratch_[i])) key = DepthTile::kEmpty;
         }
     }
 

@@ -48,8 +48,9 @@ public:
     const SubpixelRect& region() const override { return hits_.rect(); }
 
     bool take(const PointBlock& block) override {
-        if (split_.take(block, hits_, hits_) > 0) enterLevels(block);
-        return true;
+        const SplitPass::Taken taken = split_.take(block, hits_, hits_);
+        if (taken.wide > 0) enterLevels(block);
+        return taken.is_used;
     }
     bool take(const TriangleBlock& block) override { return split_.take(block, hits_); }
 

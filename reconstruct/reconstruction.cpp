@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/reconstruction.h>
 
+#include <reconstruct/depth_pass.h>
 #include <reconstruct/ewa.h>
 #include <reconstruct/gaussian.h>
 #include <reconstruct/per_pixel.h>
@@ -29,9 +30,9 @@ namespace {
 
 // Side of the largest splat, subpixels.
 int largestSplat(const ReconstructionContext& context) {
-    constexpr int kMostWorldSplat = 32;
+    constexpr int kMostWorldSplat = 33;
     if (context.settings.splat_world > 0.0) return kMostWorldSplat;
-    return std::max(1, int(std::lround(context.settings.splat_size * context.view.subpixels)));
+    return splatSide(float(context.settings.splat_size) * float(context.view.subpixels));
 }
 
 }  // namespace

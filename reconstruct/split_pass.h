@@ -33,25 +33,30 @@ public:
         wide_pass_.begin(inner);
     }
     bool isWide(uint8_t width_code) const { return is_wide_[width_code]; }
+    struct Taken {
+        int wide;      // points of the block on large surfaces
+        bool is_used;  // some point is in front
+    };
     // Points on patches go into one tile, those on large surfaces into the other (or the same).
-    // Returns how many of the latter the block has.
-    int take(const PointBlock& block, DepthTile& patches, DepthTile& surfaces) {
+    Taken take(const PointBlock& block, DepthTile& patches, DepthTile& surfaces) {
         int wide = 0;
+        bool is_used = false;
         for (int i = 0; i < block.count; ++i) wide += is_wide_[block.width[i]];
         if (wide == 0) {
-            patch_pass_.take(block, patches);
+            is_used = patch_pass_.take(block, patches);
         } else if (wide == block.count) {
-            wide_pass_.take(block, surfaces);
+            is_used = wide_pass_.take(block, surfaces);
         } else {
             part_ = block;
             for (const uint8_t part : {0, 1}) {
                 for (int i = 0; i < block.count; ++i)
                     part_.keep[i] = block.keep[i] & uint8_t(is_wide_[block.width[i]] == part);
-                part ? wide_pass_.take(part_, surfaces) : patch_pass_.take(part_, patches);
+                is_used |=
+                    part ? wide_pass_.take(part_, surfaces) : patch_pass_.take(part_, patches);
             }
             twice_drawn_ += uint64_t(block.count);
         }
-        return wide;
+        return {wide, is_used};
     }
     bool take(const TriangleBlock& block, DepthTile& tile) { return patch_pass_.take(block, tile); }
     int reach(bool narrow) const {

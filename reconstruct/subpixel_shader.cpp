@@ -12,11 +12,19 @@ Vec3 SubpixelShader::shadeSample(const SurfaceSample& sample) const {
 
 void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y) {
     const uint32_t number = DepthTile::numberOf(key);
-    if (number == last_number_ && !(number & kAnyTriangle)) return;
+    const float depth = DepthTile::depthOf(key);
+    const bool is_known = number == last_number_ && !(number & kAnyTriangle);
+    if (is_known && depth == sample_.depth) return;
     const float sub_x = float(x) + 0.5f, sub_y = float(y) + 0.5f;
     Vec3 origin, direction;
     context_.view.ray(sub_x, sub_y, origin, direction);
-    const float depth = DepthTile::depthOf(key);
+    if (is_known) {
+        // The same point elsewhere: on a slanted disc, or filled.
+        sample_.depth = depth;
+        sample_.position_camera = origin + direction * depth;
+        radiance_ = shadeSample(sample_);
+        return;
+    }
     showPoint(lookup, origin + direction * depth, number, Vec2(sub_x, sub_y));
     last_number_ = number;
 }

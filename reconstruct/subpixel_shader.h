@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks up and shades what a subpixel of a tile shows: once a point, since neighbours often show
-// the same one. Used by every reconstruction that keeps the nearest.
+// Looks up and shades what a subpixel of a tile shows: once a point and depth, since neighbours
+// often show the same one. Used by every reconstruction that keeps the nearest.
 #pragma once
 
 #include <reconstruct/depth_tile.h>

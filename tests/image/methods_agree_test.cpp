@@ -23,7 +23,7 @@ uint32_t addMesh(Scene& scene, GeneratedMesh made) {
 }
 
 // A floor, a fine sphere and a few hundred trees in a nested group, at `place`.
-Scene testScene(const DVec3& place) {
+Scene testScene(const DVec3& place, int floor_triangles = 2) {
     Scene scene;
     scene.path = "test";
     scene.lighting.suns.push_back({glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(3.0f)});
@@ -31,7 +31,8 @@ Scene testScene(const DVec3& place) {
     params.triangles = 4000;
     const uint32_t tree = addMesh(scene, makeTree(params));
     const uint32_t ball = addMesh(scene, makePrimitive("sphere", 80000, Vec3(0.7f, 0.3f, 0.2f)));
-    const uint32_t floor = addMesh(scene, makePrimitive("plane", 2, Vec3(0.4f, 0.4f, 0.35f)));
+    const uint32_t floor =
+        addMesh(scene, makePrimitive("plane", floor_triangles, Vec3(0.4f, 0.4f, 0.35f)));
     Group wood, root;
     wood.name = "wood", root.name = "root";
     wood.instances = InstanceStore(DBox3{DVec3(-200), DVec3(200)});
@@ -261,16 +262,63 @@ TEST(MethodsAgree, aCacheThatOverflowsChangesNothing) {
     }
 }
 
-TEST(MethodsAgree, cullingChangesNothing) {
-    const Scene scene = testScene(DVec3(0));
-    FrameRequest r = request(DVec3(0));
+// Two rocks of triangles about as large as a pixel, so that points and triangles meet on one
+// surface, on a plane.
+Scene rockScene() {
+    Scene scene;
+    scene.path = "test";
+    scene.lighting.suns.push_back({glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(3.0f)});
+    RockParams params;
+    params.seed = 4;
+    params.radius = 1.0;
+    params.subdivisions = 7;
+    const uint32_t rock = addMesh(scene, makeRock(params));
+    const uint32_t floor = addMesh(scene, makePrimitive("plane", 2, Vec3(0.45f, 0.45f, 0.42f)));
+    Group root;
+    root.name = "root";
+    root.instances = InstanceStore(DBox3{DVec3(-400), DVec3(400)});
+    const DMat3 turned(-0.77, 0, -0.64, 0, 1, 0, 0.64, 0, -0.77);
+    root.instances.add(ChildRef::mesh(rock), {DMat3(1.0), DVec3(0, 0.7, 0)});
+    root.instances.add(ChildRef::mesh(rock), {turned * 0.6, DVec3(-1.9, 0.3, -1.6)});
+    root.instances.add(ChildRef::mesh(floor), {DMat3(400.0), DVec3(0)});
+    scene.groups.push_back(std::move(root));
+    scene.root = 0;
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    return scene;
+}
+
+void expectCullingChangesNothing(const Scene& scene, FrameRequest r) {
     for (const Reconstruct reconstruct : kReconstructions) {
         r.settings.reconstruct = reconstruct;
         r.settings.splat_size = 2.0;
         r.settings.culling = true;
         const Image culled = render(scene, r);
         r.settings.culling = false;
-        EXPECT_EQ(culled.data, render(scene, r).data) << settingValue(r.settings, "reconstruct");
+        EXPECT_TRUE(culled.data == render(scene, r).data)
+            << settingValue(r.settings, "reconstruct") << " subpixels " << r.settings.subpixels;
+    }
+}
+
+TEST(MethodsAgree, cullingChangesNothing) {
+    for (const int floor_triangles : {2, 20000})
+        expectCullingChangesNothing(testScene(DVec3(0), floor_triangles), request(DVec3(0)));
+}
+
+TEST(MethodsAgree, cullingChangesNothingWhereSurfacesAreClosed) {
+    const Scene scene = rockScene();
+    FrameRequest r = request(DVec3(0));
+    r.settings.width = 160;
+    r.settings.height = 120;
+    r.settings.seed = 7;
+    for (const double angle : {0.0, 0.7}) {
+        const DVec3 eye(1.7 * std::sin(angle), 1.35, 1.7 * std::cos(angle));
+        r.camera = lookAt(eye, DVec3(0, 0.7, 0));
+        r.camera.fov_y = 0.73;
+        for (const int subpixels : {1, 2}) {
+            r.settings.subpixels = subpixels;
+            expectCullingChangesNothing(scene, r);
+        }
     }
 }
 

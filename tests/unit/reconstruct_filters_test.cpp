@@ -191,5 +191,30 @@ TEST(ReconstructFilters, erosionTakesBackWhatSplatsAdd) {
     }
 }
 
+TEST(ReconstructFilters, farthestWithinIsTheLargestOfASquare) {
+    DepthTile tile;
+    tile.reset({5, 7, 28, 20}, nullptr, 0);
+    Rng rng{3};
+    for (int y = 7; y < 20; ++y) {
+        for (int x = 5; x < 28; ++x)
+            tile.row(y)[x] = DepthTile::pack(float(rng.uniform()), uint32_t(x));
+    }
+    for (const int reach : {0, 1, 3, 30}) {
+        std::vector<uint64_t> farthest;
+        farthestWithin(tile, reach, farthest);
+        for (int y = 7; y < 20; ++y) {
+            for (int x = 5; x < 28; ++x) {
+                uint64_t expected = 0;
+                for (int v = std::max(7, y - reach); v < std::min(20, y + reach + 1); ++v) {
+                    for (int u = std::max(5, x - reach); u < std::min(28, x + reach + 1); ++u)
+                        expected = std::max(expected, tile.row(v)[u]);
+                }
+                ASSERT_EQ(farthest[size_t((y - 7) * tile.stride() + x - 5)], expected)
+                    << reach << " " << x << "," << y;
+            }
+        }
+    }
+}
+
 }  // namespace
 }  // namespace stipple

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 #include <reconstruct/depth_pass.h>
+#include <reconstruct/subpixel_shader.h>
 
 namespace stipple {
 namespace {
@@ -67,15 +68,19 @@ TEST(ReconstructMethods, aStraightEdgeIsWhereThePointsEnd) {
                            : method == Reconstruct::kPullPush ? 0.125f + 0.125f
                                                               : 0.13f;
         for (const float edge : {30.0f, 30.4f, 30.75f}) {
-            TestFrame frame;
-            frame.settings.reconstruct = method;
-            frame.settings.samples = 2;
-            frame.settings.splat_size = 0.75;
-            std::vector<TestPoint> points;
-            frame.addPlane(points, -4, edge, -4, 44, 100.0f, 0.0f, 0, 3);
-            const Image image = frame.draw(points);
-            EXPECT_NEAR(coveredWidth(image, image.channelIndex("coverage")), edge, most)
-                << nameOf(frame) << " edge " << edge;
+            // Splats of three subpixels and of about four.
+            for (const double splat_size : {0.75, 1.0}) {
+                if (splat_size != 0.75 && method != Reconstruct::kSplat) continue;
+                TestFrame frame;
+                frame.settings.reconstruct = method;
+                frame.settings.samples = 2;
+                frame.settings.splat_size = splat_size;
+                std::vector<TestPoint> points;
+                frame.addPlane(points, -4, edge, -4, 44, 100.0f, 0.0f, 0, 3);
+                const Image image = frame.draw(points);
+                EXPECT_NEAR(coveredWidth(image, image.channelIndex("coverage")), edge, most)
+                    << nameOf(frame) << " edge " << edge << " splats of " << splat_size;
+            }
         }
     }
 }
@@ -134,6 +139,33 @@ TEST(ReconstructMethods, surfacesCloseAtHalfAPointASubpixel) {
     }
 }
 
+// Pixels of a red surface through which a green one behind it is seen.
+int pixelsSeenThrough(const TestFrame& frame) {
+    std::vector<TestPoint> points;
+    frame.addPlane(points, -4, 64, -4, 44, 300.0f, 0.0f, 1, 11, true);
+    frame.addPlane(points, -4, 64, -4, 44, 100.0f, 0.3f, 0, 13, true);
+    const Image image = frame.draw(points);
+    int through = 0;
+    for (int y = 0; y < image.height; ++y) {
+        for (int x = 0; x < image.width; ++x) through += image.pixel(x, y)[1] > 0.1f;
+    }
+    return through;
+}
+
+TEST(ReconstructMethods, fillingClosesHolesOfAPixel) {
+    TestFrame frame;
+    frame.settings.subpixels = 2;
+    for (const Reconstruct method : {Reconstruct::kPerPixel, Reconstruct::kEwa}) {
+        frame.settings.reconstruct = method;
+        frame.settings.samples = method == Reconstruct::kPerPixel ? 1.5 : 1.0;
+        frame.settings.fill = false;
+        const int open = pixelsSeenThrough(frame);
+        EXPECT_GE(open, 8) << nameOf(frame);
+        frame.settings.fill = true;
+        EXPECT_LE(pixelsSeenThrough(frame) * 4, open) << nameOf(frame);
+    }
+}
+
 TEST(ReconstructMethods, noHolesWhereTwoLevelsMeet) {
     TestFrame frame;
     frame.settings.reconstruct = Reconstruct::kPullPush;
@@ -188,12 +220,84 @@ TEST(ReconstructMethods, splatsOfTheWorldShrinkWithDistance) {
     context.view = frame.view();
     context.settings = frame.settings;
     context.picture = &picture;
-    const DepthPass pass(context, 32);
+    const DepthPass pass(context, 33);
     const float focal = float(context.view.focal);
-    EXPECT_EQ(pass.sideAt(focal / 8.0f), 8);
+    EXPECT_EQ(pass.sideAt(focal / 8.5f), 9);
     EXPECT_EQ(pass.sideAt(focal / 3.0f), 3);
     EXPECT_EQ(pass.sideAt(1e6f), 1);
-    EXPECT_EQ(pass.sideAt(1e-3f), 32);
+    EXPECT_EQ(pass.sideAt(1e-3f), 33);
+}
+
+// 64 points on one place, turned to the eye.
+PointBlock blockAt(float x, float y, float z, float area) {
+    PointBlock block;
+    block.count = kBlockPoints;
+    for (int i = 0; i < kBlockPoints + kBlockPadding; ++i) {
+        block.x[i] = x, block.y[i] = y, block.z[i] = z;
+        block.number[i] = uint32_t(i);
+        block.keep[i] = 1;
+        block.width[i] = patchWidthCode(1e4f, kFirstSubpixelExponent);
+        block.normal_x[i] = block.normal_y[i] = 0.0f, block.normal_z[i] = -1.0f;
+        block.area[i] = area;
+    }
+    return block;
+}
+
+TEST(ReconstructMethods, blocksThatShowNothingAreGivenBack) {
+    class NoLookup : public SampleLookup {
+        void lookUp(uint32_t, float, float, SurfaceSample&) const override {}
+    } no_lookup;
+    for (const Reconstruct method : kAll) {
+        TestFrame frame;
+        frame.settings.reconstruct = method;
+        frame.settings.culling = false;
+        Picture picture(frame.view(), frame.lighting, {}, false);
+        ReconstructionContext context;
+        context.view = frame.view();
+        context.settings = frame.settings;
+        context.lighting = &frame.lighting;
+        context.materials = &frame.materials;
+        context.picture = &picture;
+        const auto reconstruction = makeReconstruction(context);
+        const SubpixelRect all{0, 0, context.view.subWidth(), context.view.subHeight()};
+        reconstruction->beginTile(all, all);
+        reconstruction->beginPass(0, no_lookup);
+        const float area = 1.0f / 16.0f;
+        EXPECT_TRUE(reconstruction->take(blockAt(0.6f, 0.6f, 100.0f, area))) << nameOf(frame);
+        EXPECT_FALSE(reconstruction->take(blockAt(0.6f, 0.6f, 200.0f, area))) << nameOf(frame);
+        EXPECT_TRUE(reconstruction->take(blockAt(9.6f, 0.6f, 200.0f, area))) << nameOf(frame);
+        if (method != Reconstruct::kEwa) continue;
+        // The subpixel it hits shows something nearer, but its disc reaches beyond.
+        EXPECT_TRUE(reconstruction->take(blockAt(4.6f, 0.6f, 50.0f, 0.01f * area)));
+        EXPECT_TRUE(reconstruction->take(blockAt(4.6f, 0.6f, 90.0f, area)));
+    }
+}
+
+TEST(ReconstructMethods, onePointAtTwoDepthsIsSeenAtBoth) {
+    // Looked up once, shaded where it is seen: haze tells the depth.
+    class Lookup : public SampleLookup {
+    public:
+        mutable int count = 0;
+        void lookUp(uint32_t, float, float, SurfaceSample& sample) const override {
+            sample.albedo = Vec3(0.5f);
+            ++count;
+        }
+    } lookup;
+    TestFrame frame;
+    frame.lighting.sky.horizon = Vec3(1.0f);
+    frame.lighting.sky.haze_distance = 100.0f;
+    ReconstructionContext context;
+    context.view = frame.view();
+    context.materials = &frame.materials;
+    context.lighting = &frame.lighting;
+    SubpixelShader shader(context), fresh(context);
+    shader.show(lookup, DepthTile::pack(50.0f, 7), 8, 8);
+    shader.show(lookup, DepthTile::pack(200.0f, 7), 9, 8);
+    EXPECT_EQ(lookup.count, 1);
+    fresh.show(lookup, DepthTile::pack(200.0f, 7), 9, 8);
+    EXPECT_EQ(shader.sample().depth, 200.0f);
+    EXPECT_EQ(shader.sample().position_camera, fresh.sample().position_camera);
+    EXPECT_EQ(shader.radiance(), fresh.radiance());
 }
 
 TEST(ReconstructMethods, drawnSettingsKeepThePoints) {
