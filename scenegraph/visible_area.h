@@ -53,7 +53,7 @@ struct VisibleArea {
 // Draws the mesh towards `direction` (to a far eye; object space) into a small grid and counts what
 // is in front. Masks and blended surfaces are tested; single-sided triangles are seen from the
 // front only. Affine maps of the mesh keep what it says: it is about shares of each triangle. The
-// mesh has been built. About 5 ms.
+// mesh has been built. About 2 ms for 20 000 triangles.
 VisibleArea measureVisibleArea(const Mesh& mesh, const std::vector<Material>& materials,
                                const std::vector<Texture>& textures, const Vec3& direction);
 
