@@ -125,7 +125,7 @@ void GroupPoints::drawList(const Affine& camera_from_child, ChildRef child, uint
         density.drawn = needed;
     }
     if (!child.isGroup()) {
-        const SeenMesh seen = seeMesh(context_, frame, child.index(), density.drawn);
+        const SeenMesh seen = seeMesh(context_, frame, child.index(), density);
         addMeshPoints(context_, points_, frame, child.index(), node, seen, density, n);
         return;
     }

@@ -209,6 +209,9 @@ Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const std::vector<T>& 
     return p;
 }
 
+// Places on a triangle that are tried for one that a mask lets stand.
+constexpr uint64_t kMaskAttempts = 8;
+
 Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, const PointKey& key) {
     const InstancePoint at = instanceAt(scene, group, node, listPosition(key));
     const Mesh& mesh = scene.meshes[group.instances.child(at.instance).index()];
@@ -228,6 +231,9 @@ Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, cons
     return p;
 }
 
+// An alpha mask may say that there is nothing.
+bool isThere(const Point& p) { return p.normal != DVec3(0.0); }
+
 void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
     const Vec3 extent = box.extent();
     for (int axis = 0; axis < 3; ++axis) {
@@ -236,7 +242,7 @@ void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
         out.position[axis][lane] = uint16_t(std::clamp(q, 0.0f, 1.0f) * 65535.0f + 0.5f);
         out.normal[axis][lane] = int16_t(std::lround(p.normal[axis] * 32767.0));
     }
-    out.width[lane] = patchWidthCode(p.patch_width, kFirstMetreExponent);
+    out.width[lane] = isThere(p) ? patchWidthCode(p.patch_width, kFirstMetreExponent) : kNoPatch;
     out.single_sided[lane] = p.single_sided;
     out.normal_or_triangle[lane] = p.is_textured ? p.at.triangle : packOctahedral(p.shading_normal);
     out.albedo_or_place[lane] = p.is_textured ? packPlace({p.at.u, p.at.v}) : packSrgb8(p.albedo);
@@ -268,9 +274,20 @@ void PointLists::makePoints(const ListName& name, uint32_t first, int count, Lis
     };
     if (is_whole) {
         makeOn(mesh.cumulative_area);
-    } else {
-        makeOn(visibleArea(name.child.index(), name.direction).cumulative);
+        return;
     }
+    const VisibleArea& visible = visibleArea(name.child.index(), name.direction);
+    makeAll([&] {
+        Point p;
+        // What was seen of a masked triangle is surface.
+        for (uint64_t attempt = 0; attempt < kMaskAttempts && !isThere(p); ++attempt) {
+            PointKey k = key;
+            if (attempt > 0) k.list = hashCombine(key.list, attempt);
+            p = makeMeshPoint(scene_, mesh, visible.cumulative, node, listPosition(key), k);
+        }
+        p.patch_width = visible.patch_width;
+        return p;
+    });
 }
 
 PointLists::List* PointLists::grow(Slot& slot, const ListName& name, uint32_t n_blocks) {

@@ -19,7 +19,7 @@ uint32_t listLength(uint64_t end) {
 }
 
 KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, ChildRef child,
-                        uint32_t node_index, const RunDensity& density) {
+                        uint32_t node_index, bool is_visible, const RunDensity& density) {
     const View& view = context.view;
     const Box3& bounds = nodeBounds(context.scene, child, node_index);
     KernelParams params;
@@ -36,6 +36,7 @@ KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, 
     const double f2 = view.focal * view.focal;
     params.gain = float(density.wanted * f2 * (view.orthographic ? 1.0 : frame.volume_scale) /
                         (32767.0 * density.drawn));
+    params.thin = !is_visible;
     params.narrow = density.narrow;
     const DVec3 center = frame.camera_from_object.point(DVec3(bounds.center()));
     const double z = view.orthographic ? 1.0 : std::max(center.z, double(view.near_z));
@@ -54,7 +55,8 @@ KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, 
 void PointWriter::add(const InstanceFrame& frame, const ListName& name, const RunDensity& density,
                       uint32_t first, uint32_t count) {
     if (count == 0) return;
-    const KernelParams params = makeParams(context_, frame, name.child, name.node, density);
+    const KernelParams params = makeParams(context_, frame, name.child, name.node,
+                                           name.direction != ListName::kWhole, density);
     Run run;
     run.camera_from_normal = frame.camera_from_normal;
     run.length_scale = float(std::sqrt(frame.area_scale));

@@ -145,11 +145,25 @@ void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& c
     const InstanceFrame frame = makeInstanceFrame(camera_from_object, path);
     SeenMesh seen;
     if (node_index == 0 && box.depth_ratio <= context_.settings.cut_ratio) {
-        seen = seeMesh(context_, frame, mesh_index,
-                       context_.settings.samples * box.bound * frame.area_scale);
+        const RunDensity density = meshDensity(frame, box);
+        seen = seeMesh(context_, frame, mesh_index, density);
+        const double count = density.drawn * context_.scene.meshes[mesh_index].area;
+        if (seen.hasVisible() && box.size <= float(context_.settings.visible_size) &&
+            count * seen.visible_share <= double(kLongestList)) {
+            addMeshPoints(context_, points_, frame, mesh_index, 0, seen, density, count);
+            return;
+        }
+        seen.direction = ListName::kWhole;
     }
     uint32_t triangle_frame = kNotTriangles;
     drawMeshNode(frame, mesh_index, seen, node_index, box, triangle_frame);
+}
+
+RunDensity TileCut::meshDensity(const InstanceFrame& frame, const BoxProjection& box) const {
+    RunDensity density;
+    density.wanted = context_.settings.samples;
+    density.drawn = density.wanted * box.bound * frame.area_scale;
+    return density;
 }
 
 // The cut through a mesh's octree. triangle_frame: where the instance stands in
@@ -162,9 +176,7 @@ void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, cons
     const MeshNode& node = mesh.nodes[node_index];
     switch (classifyNode(mesh, node, box, frame.area_scale, settings)) {
         case NodeClass::kPoints: {
-            RunDensity density;
-            density.wanted = settings.samples;
-            density.drawn = settings.samples * box.bound * frame.area_scale;
+            const RunDensity density = meshDensity(frame, box);
             addMeshPoints(context_, points_, frame, mesh_index, node_index, seen, density,
                           std::min(density.drawn * node.area, 1e9));
             return;

@@ -37,6 +37,7 @@ private:
                   const BoxProjection& box);
     void drawMeshNode(const InstanceFrame& frame, uint32_t mesh, const SeenMesh& seen,
                       uint32_t node, const BoxProjection& box, uint32_t& triangle_frame);
+    RunDensity meshDensity(const InstanceFrame& frame, const BoxProjection& box) const;
     void collect(const Affine& camera_from_child, const Box3& bounds, uint32_t index,
                  bool is_instance);
     void sortCollected(size_t begin);

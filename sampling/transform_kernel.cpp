@@ -10,7 +10,7 @@ namespace stipple {
 
 namespace {
 
-template <bool kOrthographic, bool kRandom>
+template <bool kThin, bool kOrthographic, bool kRandom>
 inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
                                                          const ListBlock& list, int first_lane,
                                                          uint32_t first_index, int count,
@@ -49,6 +49,17 @@ inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
     for (int i = 0; i < n; ++i) {
         const float dx = bx + sx * float(px[i]), dy = by + sy * float(py[i]),
                     dz = bz + sz * float(pz[i]);
+        if constexpr (!kThin) {
+            const float x = m00 * dx + m01 * dy + m02 * dz;
+            const float y = m10 * dx + m11 * dy + m12 * dz;
+            const float z = m20 * dx + m21 * dy + m22 * dz;
+            out_x[i] = x;
+            out_y[i] = y;
+            out_z[i] = z;
+            number[i] = first_number + uint32_t(i);
+            keep[i] = uint8_t((widths[i] != 0) & (z > z_near) & (z <= z_far));
+            continue;
+        }
         const float nx = float(qx[i]), ny = float(qy[i]), nz = float(qz[i]);
         const float x = m00 * dx + m01 * dy + m02 * dz;
         const float y = m10 * dx + m11 * dy + m12 * dz;
@@ -79,12 +90,15 @@ __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) vo
     const auto& l = list;
     const int f = first_lane;
     const uint32_t i = first_index, number = first_number;
-    if (params.orthographic) {
-        params.random ? transformLoop<true, true>(params, l, f, i, count, number, lane, out)
-                      : transformLoop<true, false>(params, l, f, i, count, number, lane, out);
+    if (!params.thin) {
+        transformLoop<false, false, false>(params, l, f, i, count, number, lane, out);
+    } else if (params.orthographic) {
+        params.random ? transformLoop<true, true, true>(params, l, f, i, count, number, lane, out)
+                      : transformLoop<true, true, false>(params, l, f, i, count, number, lane, out);
     } else {
-        params.random ? transformLoop<false, true>(params, l, f, i, count, number, lane, out)
-                      : transformLoop<false, false>(params, l, f, i, count, number, lane, out);
+        params.random
+            ? transformLoop<true, false, true>(params, l, f, i, count, number, lane, out)
+            : transformLoop<true, false, false>(params, l, f, i, count, number, lane, out);
     }
 }
 

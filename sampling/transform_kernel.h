@@ -13,6 +13,7 @@ struct KernelParams {
     Vec3 box_from_eye = Vec3(0);  // the node box's minimum minus the eye, object space
     Vec3 step = Vec3(0);          // object-space size of one quantization step
     Mat3 camera_from_object = Mat3(1.0f);
+    bool thin = true;  // else all points are kept, but for those without a patch width
     bool orthographic = false;
     Vec3 facing = Vec3(0);  // orthographic: object-space vector d with prj = f^2 |n.d|
     float gain = 0.0f;      // times |n.d| (/ z^3 in perspective; n is unit * 32767) this is the

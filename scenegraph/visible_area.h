@@ -20,34 +20,29 @@ inline constexpr int kDirections = 32;
 int directionIndex(const Vec3& direction);
 Vec3 directionOf(int index);  // its centre, unit
 
-// Share of the points on the whole surface with which a mesh covers, in expectation, what rays
-// would find: by the distance between points (were all drawn), an octave each. Falls with the
-// distance.
-struct WholeShare {
+// How many points, as a multiple of those that their density asks for, make a mesh cover, in
+// expectation, what rays would find: by the distance between points, an octave each.
+struct SpacingTable {
     static constexpr int kOctaves = 16;
-    float first_spacing = 1.0f;                     // object space, m
-    std::array<float, kOctaves> with_visible = {};  // where the rest lies on the visible area
-    std::array<float, kOctaves> alone = {};         // where the rest is left out
+    float first_spacing = 1.0f;  // object space, m
+    std::array<float, kOctaves> factors = {};
 
-    // Interpolated between octaves.
-    float withVisibleAt(float spacing) const { return at(with_visible, spacing); }
-    float aloneAt(float spacing) const { return at(alone, spacing); }
-
-private:
-    float at(const std::array<float, kOctaves>& shares, float spacing) const;
+    float at(float spacing) const;  // interpolated
 };
 
 struct VisibleArea {
-    // Visible area of the triangles before each (object space, m^2): triangles.size() + 1 entries,
-    // a distribution list.
+    // What the triangles before each cover of the picture (at right angles to the direction, object
+    // space, m^2): triangles.size() + 1 entries, a distribution list.
     std::vector<float> cumulative;
-    WholeShare whole_share;
+    // Of what the mesh covers: four times its area over its outline, that of a square patch.
+    float patch_width = 0.0f;
+    // For points on the visible area: above 1 where gaps are finer than the points' distances.
+    SpacingTable visible_factor;
+    // For points on the whole surface: falls with the distance, as layers show through each other.
+    SpacingTable whole_factor;
     float layers = 1.0f;  // of surface, one behind the other, where there is any
 
-    double area(const MeshNode& node) const {
-        return double(cumulative[node.first_triangle + node.triangle_count]) -
-               double(cumulative[node.first_triangle]);
-    }
+    double covered() const { return double(cumulative.back()); }
 };
 
 // Draws the mesh towards `direction` (to a far eye; object space) into a small grid and counts what

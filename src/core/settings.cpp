@@ -137,9 +137,10 @@ std::vector<Entry> makeEntries() {
                kOnlySet),
         number("list_length", &S::list_length, 1, 1 << 24, "points",
                "most points taken from a node's list before the node is opened", kOnlySet),
-        onOff("visible_lists", &S::visible_lists,
-              "far plants are drawn by what can be seen of them from the eye's direction",
-              kOnlySet),
+        number("visible_size", &S::visible_size, 0.0, 4096.0, "subpixels",
+               "meshes no larger than this are drawn by what can be seen of them from the eye's "
+               "direction; larger is faster and less exact, 0 never does",
+               kOnlySet),
         onOff("culling", &S::culling, "skip batches behind what a tile has already drawn",
               kOnlySet),
         number("splat_world", &S::splat_world, 0.0, 1e6, "metres",

@@ -43,11 +43,12 @@ struct RenderSettings {
                                   // points; on surfaces a quarter of it
     double large_triangle =
         1024.0;  // triangles larger than this many subpixels go to OSMesa, before the tiles
-    int list_length = 1024;     // most points taken from a node's list before the node is opened
-    int tile_size = 384;        // subpixels along a side of a screen tile (rounded to whole pixels)
-    bool visible_lists = true;  // draw only what can be seen of far meshes from the eye's direction
-    bool culling = true;        // skip batches behind what a tile has already drawn
-    bool fill = true;           // per-pixel: occlusion removal and filling
+    int list_length = 1024;  // most points taken from a node's list before the node is opened
+    int tile_size = 384;     // subpixels along a side of a screen tile (rounded to whole pixels)
+    double visible_size = 32.0;  // meshes no larger than this many subpixels are drawn by what can
+                                 // be seen of them from the eye's direction
+    bool culling = true;         // skip batches behind what a tile has already drawn
+    bool fill = true;            // per-pixel: occlusion removal and filling
 };
 
 // One setting as command line, JSON and help see it.

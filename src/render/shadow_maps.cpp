@@ -226,7 +226,7 @@ private:
         settings.samples = 1.0;
         settings.tile_size = kPageTexels;
         settings.splat_world = 0.0;
-        settings.visible_lists = false;  // the same lists as the camera's, and no loss of depth
+        settings.visible_size = 0.0;  // the same lists as the camera's, and no loss of depth
         settings.large_triangle = double(kInfinity);  // the tiles' rasterizer draws no page in vain
         const auto slotOf = [&](const SubpixelRect& inner) {
             return level.page_slot[size_t(inner.y0 / kPageTexels) * size_t(level.columns) +

@@ -56,8 +56,8 @@ std::string settingsText(const RenderSettings& s) {
     } else if (s.method == Method::kZBuffer) {
         std::snprintf(text, sizeof text, "%dx%d", s.subpixels, s.subpixels);
     } else {
-        std::snprintf(text, sizeof text, "%dx%d K=%.3g A=%g", s.subpixels, s.subpixels, s.samples,
-                      s.area_threshold);
+        std::snprintf(text, sizeof text, "%dx%d K=%.3g A=%g V=%g", s.subpixels, s.subpixels,
+                      s.samples, s.area_threshold, s.visible_size);
     }
     return text;
 }
@@ -74,12 +74,12 @@ __attribute__((format(printf, 2, 3))) void append(std::string& text, const char*
 void appendQuality(std::string& text, const CameraBench& camera, size_t q) {
     append(text, "\n  quality of %d %s a pixel\n", kQualityRays[q],
            kQualityRays[q] == 1 ? "ray" : "rays");
-    append(text, "    %-8s %-20s %8s %7s %8s %9s %9s  %s\n", "method", "settings", "PSNR dB",
+    append(text, "    %-8s %-24s %8s %7s %8s %9s %9s  %s\n", "method", "settings", "PSNR dB",
            "FLIP", "holes %", "still s", "moving s", "points are faster by");
     const BenchRun& points = findMethod(camera, Method::kPoints)->runs[q];
     for (const BenchMethod& method : camera.methods) {
         const BenchRun& run = method.runs[q];
-        append(text, "    %-8s %-20s %8.2f %7.4f %8.4f %9.4f %9.4f",
+        append(text, "    %-8s %-24s %8.2f %7.4f %8.4f %9.4f %9.4f",
                methodName(method.method).c_str(), settingsText(run.settings).c_str(),
                run.quality.psnr, run.quality.flip,
                run.quality.holes ? 100.0 * run.quality.holes->fraction : 0.0, run.still_seconds,
@@ -96,6 +96,7 @@ Json settingsJson(const RenderSettings& s) {
     return {{"samples", s.samples},
             {"subpixels", s.subpixels},
             {"area_threshold", s.area_threshold},
+            {"visible_size", s.visible_size},
             {"seed", s.seed}};
 }
 

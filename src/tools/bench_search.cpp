@@ -2,6 +2,7 @@
 #include <tools/bench_search.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace stipple {
 
@@ -9,7 +10,9 @@ namespace {
 
 constexpr int kSubpixels[] = {1, 2, 3, 4, 5, 6, 8};
 constexpr double kSamples[] = {0.5, 1.0, 2.0, 4.0};
-constexpr double kAreaThresholds[] = {1.0, 16.0};
+// area_threshold and visible_size
+constexpr std::pair<double, double> kDetails[] = {
+    {1.0, 32.0}, {16.0, 32.0}, {4.0, 96.0}, {16.0, 96.0}};
 constexpr double kGain = 0.1;  // dB: more points that bring less are not worth trying further
 
 }  // namespace
@@ -77,9 +80,10 @@ std::vector<SearchStep> searchSettings(const RenderSettings& base,
         if (!found) found = &bestStep(steps);
         const RenderSettings around = found->settings;
         std::vector<RenderSettings> others;
-        for (const double area : kAreaThresholds) {
+        for (const auto& [area, visible] : kDetails) {
             others.push_back(around);
             others.back().area_threshold = area;
+            others.back().visible_size = visible;
         }
         // Between the steps of the grid.
         others.push_back(around);
@@ -89,7 +93,8 @@ std::vector<SearchStep> searchSettings(const RenderSettings& base,
                 std::any_of(steps.begin(), steps.end(), [&](const SearchStep& step) {
                     return step.settings.subpixels == settings.subpixels &&
                            step.settings.samples == settings.samples &&
-                           step.settings.area_threshold == settings.area_threshold;
+                           step.settings.area_threshold == settings.area_threshold &&
+                           step.settings.visible_size == settings.visible_size;
                 });
             if (!is_known) steps.push_back(attempt(settings));
         }

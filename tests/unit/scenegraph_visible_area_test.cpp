@@ -43,7 +43,7 @@ TEST(VisibleArea, onlyTheTopOfAStackIsSeenFromAbove) {
     const std::vector<Material> materials(1);
     const Mesh mesh = stackOfSquares(3, 0.1f, materials);
     const VisibleArea seen = measureVisibleArea(mesh, materials, {}, Vec3(0, 1, 0));
-    EXPECT_NEAR(seen.area(mesh.nodes[0]), 1.0, 0.015);
+    EXPECT_NEAR(seen.covered(), 1.0, 0.015);
     double below = 0.0;
     for (size_t t = 0; t < mesh.triangles.size(); ++t) {
         if (mesh.positions[mesh.triangles[t].x].y < -0.05f)
@@ -59,7 +59,7 @@ TEST(VisibleArea, singleSidedSurfacesAreNotSeenFromBehind) {
         materials[0].double_sided = double_sided;
         const Mesh mesh = stackOfSquares(1, 0.1f, materials);
         const VisibleArea seen = measureVisibleArea(mesh, materials, {}, Vec3(0, -1, 0));
-        EXPECT_NEAR(seen.area(mesh.nodes[0]), double_sided ? 1.0 : 0.0, 0.015);
+        EXPECT_NEAR(seen.covered(), double_sided ? 1.0 : 0.0, 0.015);
     }
 }
 
@@ -69,7 +69,9 @@ TEST(VisibleArea, halfOfASphereIsSeenFromAnywhere) {
     for (const int direction : {0, 5, 14, 31}) {
         const VisibleArea seen =
             measureVisibleArea(sphere.mesh, sphere.materials, {}, directionOf(direction));
-        EXPECT_NEAR(seen.area(sphere.mesh.nodes[0]) / sphere.mesh.area, 0.5, 0.02);
+        EXPECT_NEAR(seen.covered() / sphere.mesh.area, 0.25, 0.01);
+        const float diameter = sphere.mesh.bounds.extent().x;
+        EXPECT_NEAR(seen.patch_width / diameter, 1.0f, 0.01f);
         EXPECT_NEAR(seen.layers, 1.0f, 1e-3f);  // its back is not drawn
     }
 }
@@ -83,8 +85,9 @@ TEST(VisibleArea, affineMapsKeepShares) {
     for (Vec3& p : stretched.positions) p *= stretch;
     buildMesh(stretched, materials, "stretched");
     const VisibleArea after = measureVisibleArea(stretched, materials, {}, to_eye * stretch);
-    EXPECT_NEAR(seen.area(mesh.nodes[0]) / mesh.area,
-                after.area(stretched.nodes[0]) / stretched.area, 0.02);
+    const size_t half = mesh.triangles.size() / 2;
+    EXPECT_NEAR(seen.cumulative[half] / seen.cumulative.back(),
+                after.cumulative[half] / after.cumulative.back(), 0.02);
 }
 
 TEST(VisibleArea, theFartherTheLessOfTheWholeSurface) {
@@ -92,17 +95,19 @@ TEST(VisibleArea, theFartherTheLessOfTheWholeSurface) {
     params.triangles = 8000;
     GeneratedMesh tree = makeTree(params);
     buildMesh(tree.mesh, tree.materials, "tree");
-    const WholeShare share =
-        measureVisibleArea(tree.mesh, tree.materials, {}, Vec3(1.0f, 0.3f, 0.2f)).whole_share;
-    EXPECT_EQ(share.withVisibleAt(0.0f), 1.0f);
-    for (size_t i = 1; i < size_t(WholeShare::kOctaves); ++i) {
-        EXPECT_LE(share.with_visible[i], share.with_visible[i - 1]);
-        EXPECT_LE(share.alone[i], share.alone[i - 1]);
-        EXPECT_LE(share.with_visible[i], share.alone[i] + 1e-3f);
-    }
-    // Where the tree is much smaller than the distance between points, what is visible is enough.
-    EXPECT_LT(share.withVisibleAt(1e4f * share.first_spacing), 0.05f);
-    EXPECT_GT(share.withVisibleAt(4.0f * share.first_spacing), 0.2f);
+    const VisibleArea seen =
+        measureVisibleArea(tree.mesh, tree.materials, {}, Vec3(1.0f, 0.3f, 0.2f));
+    const SpacingTable& whole = seen.whole_factor;
+    const SpacingTable& visible = seen.visible_factor;
+    EXPECT_EQ(whole.at(0.0f), 1.0f);
+    EXPECT_NEAR(visible.at(0.0f), 1.2f, 0.1f);
+    for (size_t i = 1; i < size_t(SpacingTable::kOctaves); ++i)
+        EXPECT_LE(whole.factors[i], whole.factors[i - 1]);
+    EXPECT_LT(whole.at(1e4f * whole.first_spacing), 0.5f);
+    EXPECT_GT(whole.at(4.0f * whole.first_spacing), 0.5f);
+    // Points about as far apart as the gaps collide; a tree much smaller than that needs none more.
+    EXPECT_GT(visible.at(2.0f * seen.patch_width), 1.3f);
+    EXPECT_LT(visible.at(1e4f * visible.first_spacing), 1.05f);
 }
 
 }  // namespace

@@ -105,7 +105,8 @@ TEST(ToolsBenchSearch, triesNoSettingsTwice) {
         for (size_t j = 0; j < i; ++j) {
             EXPECT_FALSE(steps[i].settings.subpixels == steps[j].settings.subpixels &&
                          steps[i].settings.samples == steps[j].settings.samples &&
-                         steps[i].settings.area_threshold == steps[j].settings.area_threshold);
+                         steps[i].settings.area_threshold == steps[j].settings.area_threshold &&
+                         steps[i].settings.visible_size == steps[j].settings.visible_size);
         }
     }
 }
