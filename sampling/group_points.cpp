@@ -49,7 +49,7 @@ void GroupPoints::sweep(ChildRef ref, uint32_t node_index, const Affine& camera_
             const Affine camera_from_child = camera_from_group * group.instances.groupFromChild(i);
             const uint64_t child_path = extendObjectPath(path, group.listed_index[i]);
             if (child.isGroup()) {
-                sweep(child, 0, camera_from_child, child_path, base, child_scale);
+                sweepChild(child, camera_from_child, child_path, base, child_scale, count);
             } else {
                 drawList(camera_from_child, child, 0, child_path, child_scale, uint32_t(count));
             }
@@ -62,6 +62,30 @@ void GroupPoints::sweep(ChildRef ref, uint32_t node_index, const Affine& camera_
             sweep(ref, c, camera_from_group, path, base, scale);
         base = end;
     }
+}
+
+// A group whose sums have changed since those above were made (Group::as_child) gets its own
+// positions, as many points as its area now deserves.
+void GroupPoints::sweepChild(ChildRef child, const Affine& camera_from_child, uint64_t path,
+                             double base, double scale, uint64_t count) {
+    const Group& group = context_.scene.groups[child.index()];
+    if (group.area == group.as_child.area) {
+        sweep(child, 0, camera_from_child, path, base, scale);
+        return;
+    }
+    const uint64_t n = changedCount(group, double(count), path);
+    if (n == 0) return;
+    const double spacing = spacing_, phase = phase_;
+    spacing_ = group.area * scale / double(n);
+    phase_ = uniformDouble(mixBits(path));
+    sweep(child, 0, camera_from_child, path, 0.0, scale);
+    spacing_ = spacing;
+    phase_ = phase;
+}
+
+uint64_t GroupPoints::changedCount(const Group& group, double count, uint64_t path) const {
+    return roundAtRandom(count * group.area / group.as_child.area,
+                         hashCombine(context_.settings.seed, path, 9));
 }
 
 uint64_t GroupPoints::pointsBefore(double position) const {
@@ -86,7 +110,13 @@ void GroupPoints::drawOne(ChildRef ref, uint32_t node, const Affine& camera_from
     const uint64_t child_path = extendObjectPath(path, group.listed_index[at.instance]);
     const double child_scale = scale * group.instances.areaScale(at.instance);
     if (child.isGroup()) {
-        drawOne(child, 0, camera_from_child, child_path, child_scale, at.position, index);
+        const Group& inner = context_.scene.groups[child.index()];
+        const uint64_t n = inner.area == inner.as_child.area
+                               ? 1
+                               : changedCount(inner, 1.0, hashCombine(child_path, index));
+        for (uint64_t k = 0; k < n; ++k)
+            drawOne(child, 0, camera_from_child, child_path, child_scale, at.position,
+                    index + uint32_t(k) * 0x9e3779b9u);
     } else {
         points_.add(makeInstanceFrame(camera_from_child, child_path), {child, 0},
                     childDensity(child_scale), index, 1);

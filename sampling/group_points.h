@@ -20,6 +20,9 @@ public:
 private:
     void sweep(ChildRef group, uint32_t node, const Affine& camera_from_group, uint64_t path,
                double base, double scale);
+    void sweepChild(ChildRef group, const Affine& camera_from_group, uint64_t path, double base,
+                    double scale, uint64_t count);
+    uint64_t changedCount(const Group& group, double count, uint64_t path) const;
     void drawOne(ChildRef group, uint32_t node, const Affine& camera_from_group, uint64_t path,
                  double scale, double position, uint32_t index);
     void drawList(const Affine& camera_from_child, ChildRef child, uint32_t node, uint64_t path,

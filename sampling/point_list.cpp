@@ -75,7 +75,7 @@ PointLists::PointLists(const Scene& scene)
     for (const Group& group : scene.groups) {
         for (size_t i = 0; i < group.instances.size(); ++i) {
             const ChildRef child = group.instances.child(i);
-            if (child.isGroup()) ++uses[child.index()];
+            if (!child.isNone() && child.isGroup()) ++uses[child.index()];
         }
     }
     for (const Mesh& mesh : scene.meshes) mesh_slots_.emplace_back(mesh.nodes.size());
@@ -133,30 +133,66 @@ PointLists::Slot& PointLists::slotOf(const ListName& name) {
     return (name.child.isGroup() ? group_slots_ : mesh_slots_)[index][name.node];
 }
 
+void PointLists::drop(Slot& slot) {
+    List* list = slot.list.exchange(nullptr);
+    if (!list) return;
+    bytes_ -= list->block_count * sizeof(ListBlock);
+    delete list;
+}
+
+void PointLists::sceneChanged(const SceneChanges& changes) {
+    while (mesh_slots_.size() < scene_.meshes.size())
+        mesh_slots_.emplace_back(scene_.meshes[mesh_slots_.size()].nodes.size());
+    // What has come since is instanced too seldom to have lists.
+    while (group_slots_.size() < scene_.groups.size()) group_slots_.emplace_back(0);
+    if (seen_.size() < scene_.meshes.size() * kDirections) {
+        std::vector<std::atomic<Seen*>> seen(scene_.meshes.size() * kDirections);
+        for (size_t i = 0; i < seen_.size(); ++i) seen[i] = seen_[i].load();
+        seen_ = std::move(seen);
+    }
+    for (const SceneChanges::Node& changed : changes.nodes) {
+        Slots& slots = group_slots_[changed.group];
+        if (changed.node < slots.size()) drop(slots[changed.node]);
+    }
+    for (size_t g = 0; g < group_slots_.size(); ++g) {
+        Slots& slots = group_slots_[g];
+        const size_t n = scene_.groups[g].nodes.size();
+        if (slots.empty()) continue;
+        if (changes.all_nodes || scene_.groups[g].depth > 1) {
+            for (Slot& slot : slots) drop(slot);
+        }
+        if (scene_.groups[g].depth > 1) {
+            slots = Slots();
+        } else if (slots.size() < n) {
+            Slots more(n);
+            for (size_t i = 0; i < slots.size(); ++i) {
+                more[i].list = slots[i].list.load();
+                more[i].last_used = slots[i].last_used.load();
+            }
+            slots = std::move(more);
+        }
+    }
+}
+
 void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
     retired_.clear();
     bytes_ -= std::exchange(retired_bytes_, 0);
     budget_ = budget_bytes;
     const bool is_new = !(identity == identity_);
     identity_ = identity;
-    const auto drop = [&](bool also_used) {
+    const auto dropLists = [&](bool also_used) {
         forEachSlot([&](Slot& slot) {
-            List* list = slot.list.load();
-            if (!list || (!also_used && slot.last_used.load() == frame_)) return;
-            bytes_ -= list->block_count * sizeof(ListBlock);
-            delete slot.list.exchange(nullptr);
+            if (also_used || slot.last_used.load() != frame_) drop(slot);
         });
     };
-    if (is_full_.exchange(false)) drop(false);
-    if (is_new || bytes_ > budget_) drop(true);
+    if (is_full_.exchange(false)) dropLists(false);
+    if (is_new || bytes_ > budget_) dropLists(true);
     for (auto& place : seen_) {
         Seen* seen = place.load();
         if (bytes() <= budget_) break;
         if (!seen || seen->last_used.load() == frame_) continue;
         visible_bytes_ -= seen->bytes();
-        if (const List* list = seen->slot.list.load())
-            bytes_ -= list->block_count * sizeof(ListBlock);
-        delete seen->slot.list.load();
+        drop(seen->slot);
         delete place.exchange(nullptr);
     }
     ++frame_;

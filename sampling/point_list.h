@@ -8,6 +8,7 @@
 
 #include <core/points.h>
 #include <sampling/list_point.h>
+#include <scenegraph/scene_editor.h>
 #include <scenegraph/visible_area.h>
 
 #include <atomic>
@@ -71,6 +72,8 @@ public:
     // Meshes have lists, and innermost groups with many instances of their own: one list serves
     // all.
     bool hasLists(ChildRef child) const { return !slotsOf(child).empty(); }
+    // Call between frames: drops the lists of nodes that have changed, keeps the others.
+    void sceneChanged(const SceneChanges& changes);
     // Call between frames: sets the identity (a new one empties the cache) and the budget. Where
     // it did not suffice, lists that were not used in the last frame are dropped; where it has
     // become smaller than what is there, all are.
@@ -107,6 +110,7 @@ private:
     }
     Slot& slotOf(const ListName& name);
     Seen& seen(uint32_t mesh, int direction);
+    void drop(Slot& slot);
     template <class Visit>
     void forEachSlot(const Visit& visit);
     void makePoints(const ListName& name, uint32_t first, int count, ListBlock& out);

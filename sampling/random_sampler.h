@@ -17,6 +17,8 @@ public:
     // Plans a frame; the plan stays until the next call.
     const FramePlan& plan(const View& view, const RenderSettings& settings, ThreadPool& pool,
                           const CancelFlag* cancel);
+    // Between frames, when the scene has been edited.
+    void sceneChanged(const SceneChanges& changes) { lists_.sceneChanged(changes); }
     std::unique_ptr<TileEmitter> makeEmitter() override;
     size_t cacheBytes() const { return lists_.bytes(); }
 

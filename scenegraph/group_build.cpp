@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <scenegraph/group_build.h>
 
+#include <scenegraph/group_sums.h>
 #include <scenegraph/morton.h>
 
 namespace stipple {
@@ -10,33 +11,6 @@ namespace {
 constexpr uint32_t kLeafInstances = 20;
 constexpr size_t kChunkInstances = 16384;     // of loops over all instances
 constexpr uint32_t kTaskInstances = 1 << 15;  // subtrees up to this size are built by one thread
-
-// What a group must know of a child: a mesh or another group.
-struct ChildSums {
-    DVec3 center = DVec3(0.0), half = DVec3(-1.0);  // of its box; half < 0: empty
-    double area = 0.0;
-    float max_triangle_area = 0.0f;
-
-    bool isEmpty() const { return half.x < 0.0; }
-};
-
-ChildSums childSums(const Scene& scene, ChildRef child) {
-    ChildSums sums;
-    DBox3 box;
-    if (child.isGroup()) {
-        const Group& g = scene.groups[child.index()];
-        box = g.bounds;
-        sums.area = g.area, sums.max_triangle_area = g.max_triangle_area;
-    } else {
-        const Mesh& m = scene.meshes[child.index()];
-        if (!m.bounds.isEmpty()) box = {DVec3(m.bounds.min), DVec3(m.bounds.max)};
-        sums.area = m.area;
-        for (const Stratum& s : m.strata)
-            sums.max_triangle_area = std::max(sums.max_triangle_area, s.max_triangle_area);
-    }
-    if (!box.isEmpty()) sums.center = box.center(), sums.half = 0.5 * box.extent();
-    return sums;
-}
 
 // The sums of the group's children, looked up once for each child where that is less work than once
 // for each instance.
@@ -49,7 +23,7 @@ public:
         for (uint32_t i = 0; i < scene.groups.size(); ++i)
             groups_.push_back(childSums(scene, ChildRef::group(i)));
     }
-    ChildSums operator[](ChildRef child) const {
+    ChildSums operator()(ChildRef child) const {
         if (groups_.empty()) return childSums(scene_, child);
         return child.isGroup() ? groups_[child.index()] : meshes_[child.index()];
     }
@@ -58,15 +32,6 @@ private:
     const Scene& scene_;
     std::vector<ChildSums> meshes_, groups_;
 };
-
-DMat3 absolute(const DMat3& m) { return DMat3(glm::abs(m[0]), glm::abs(m[1]), glm::abs(m[2])); }
-
-// An instance's box; false if it is empty (then center is the translation).
-bool instanceBox(const ChildSums& child, const Affine& transform, DVec3& center, DVec3& half) {
-    center = transform.point(child.center);
-    half = absolute(transform.linear) * child.half;
-    return !child.isEmpty();
-}
 
 // The cell in which an instance resides: the first code of the cell, then the level (parents before
 // children). `index` makes the order total.
@@ -132,7 +97,6 @@ private:
         const auto [index, begin, end, level] = task;
         GroupNode node;
         node.first = begin;
-        node.count = end - begin;
         uint32_t residents = begin;
         if (end - begin <= kLeafInstances || level == uint32_t(kMortonLevels)) {
             residents = end;
@@ -166,27 +130,8 @@ private:
         }
     }
 
-    // Adds up what resides in the node and its children, which have their sums.
     void accumulate(const std::vector<GroupNode>& nodes, GroupNode& node) const {
-        DBox3 bounds;
-        for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
-            const ChildSums child = children_[group_.instances.child(i)];
-            DVec3 center, half;
-            if (instanceBox(child, group_.instances.groupFromChild(i), center, half))
-                bounds.extend(DBox3{center - half, center + half});
-            const double scale = group_.instances.areaScale(i);
-            node.area += child.area * scale;
-            node.max_triangle_area =
-                std::max(node.max_triangle_area, float(child.max_triangle_area * scale));
-        }
-        for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c) {
-            const GroupNode& child = nodes[c];
-            if (child.area > 0.0)
-                bounds.extend(DBox3{DVec3(child.bounds.min), DVec3(child.bounds.max)});
-            node.area += child.area;
-            node.max_triangle_area = std::max(node.max_triangle_area, child.max_triangle_area);
-        }
-        if (!bounds.isEmpty()) node.bounds = enclosingFloatBox(bounds);
+        accumulateNode(group_, nodes, children_, node);
     }
 
     const ChildTable& children_;
@@ -236,7 +181,7 @@ ChunkSums measure(const Scene& scene, const Group& group, const ChildTable& chil
             sums.triangles += double(scene.meshes[child.index()].triangles.size());
         }
         DVec3 center, half;
-        const bool has_box = instanceBox(children[child], transform, center, half);
+        const bool has_box = instanceBox(children(child), transform, center, half);
         extents[i] = {Vec3(center - origin), has_box ? float(2.0 * glm::length(half)) : 0.0f};
         sums.centers.extend(extents[i].center);
         if (has_box) sums.bounds.extend(DBox3{center - half, center + half});
@@ -254,9 +199,34 @@ CellKey cellKey(const Extent& extent, uint32_t index, const DVec3& origin, doubl
     return key;
 }
 
+// Instance i becomes instance order[i]; names go with them.
+void reorder(Group& group, std::vector<uint32_t> order, ThreadPool& pool) {
+    group.instances.permute(order, pool);
+    if (!group.listed_index.empty()) {
+        for (uint32_t& index : order) index = group.listed_index[index];
+    }
+    group.listed_index = std::move(order);
+}
+
+void removeEmpty(Group& group, ThreadPool& pool) {
+    const size_t n = group.instances.size();
+    std::vector<uint32_t> order;
+    for (uint32_t i = 0; i < n; ++i) {
+        if (group.instances.child(i).isNone()) {
+            order.reserve(n);
+            for (uint32_t k = 0; k < n; ++k) {
+                if (!group.instances.child(k).isNone()) order.push_back(k);
+            }
+            reorder(group, std::move(order), pool);
+            return;
+        }
+    }
+}
+
 }  // namespace
 
 void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool& pool) {
+    removeEmpty(group, pool);
     const size_t n = group.instances.size();
     const size_t n_chunks = (n + kChunkInstances - 1) / kChunkInstances;
     const ChildTable children(scene, group);
@@ -303,13 +273,15 @@ void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool
     parallelSort(pool, keys, std::less<CellKey>());
     std::vector<uint32_t> order(n);
     for (size_t i = 0; i < n; ++i) order[i] = keys[i].index;
-    group.instances.permute(order, pool);
-    group.listed_index = std::move(order);
+    reorder(group, std::move(order), pool);
+    for (const uint32_t index : group.listed_index)
+        group.next_index = std::max(group.next_index, index + 1);
 
     GroupOctree(children, group, keys).build(pool);
     group.nodes.shrink_to_fit();
     group.area = group.nodes[0].area;
     group.max_triangle_area = group.nodes[0].max_triangle_area;
+    group.as_child = {group.bounds, group.area, group.max_triangle_area};
 }
 
 size_t Group::bytes() const {

@@ -41,25 +41,48 @@ bool InstanceStore::quantize(const DVec3& translation, int32_t (&position)[3]) c
     return true;
 }
 
-void InstanceStore::addGeneral(ChildRef child, const Affine& group_from_child) {
-    records_.push_back({{int32_t(general_.size()), 0, 0}, {0, 0, 0}, 0.0f, child});
-    general_.push_back(group_from_child);
-}
-
-void InstanceStore::add(ChildRef child, const Affine& group_from_child) {
+InstanceStore::Record InstanceStore::makeRecord(ChildRef child, const Affine& group_from_child) {
+    Record r;
+    r.child = child;
     double scale;
     glm::dquat q;
-    Record r;
     if (quantize(group_from_child.translation, r.position) &&
         decomposeSimilarity(group_from_child.linear, scale, q)) {
         r.rotation[0] = float(q.x), r.rotation[1] = float(q.y), r.rotation[2] = float(q.z);
         r.scale = float(scale);
-        r.child = child;
-        records_.push_back(r);
-    } else {
-        addGeneral(child, group_from_child);
+        return r;
     }
+    uint32_t index = uint32_t(general_.size());
+    if (free_general_.empty()) {
+        general_.push_back(group_from_child);
+    } else {
+        index = free_general_.back();
+        free_general_.pop_back();
+        general_[index] = group_from_child;
+    }
+    r = Record();
+    r.child = child;
+    r.position[0] = int32_t(index);
+    r.scale = 0.0f;
+    return r;
 }
+
+void InstanceStore::add(ChildRef child, const Affine& group_from_child) {
+    records_.push_back(makeRecord(child, group_from_child));
+}
+
+void InstanceStore::set(size_t i, ChildRef child, const Affine& group_from_child) {
+    erase(i);
+    records_[i] = makeRecord(child, group_from_child);
+}
+
+void InstanceStore::erase(size_t i) {
+    Record& r = records_[i];
+    if (r.scale == 0.0f) free_general_.push_back(uint32_t(r.position[0]));
+    r = Record();
+}
+
+void InstanceStore::addEmpty(size_t n) { records_.resize(records_.size() + n); }
 
 void InstanceStore::addSimilarity(ChildRef child, const DVec3& translation,
                                   const glm::dvec4& rotation, double scale) {
@@ -71,7 +94,7 @@ void InstanceStore::addSimilarity(ChildRef child, const DVec3& translation,
         r.child = child;
         records_.push_back(r);
     } else {
-        addGeneral(child, {glm::mat3_cast(glm::dquat(q.w, q.x, q.y, q.z)) * scale, translation});
+        add(child, {glm::mat3_cast(glm::dquat(q.w, q.x, q.y, q.z)) * scale, translation});
     }
 }
 
@@ -118,7 +141,7 @@ void InstanceStore::addChunks(ThreadPool& pool, size_t n_chunks,
 }
 
 void InstanceStore::permute(const std::vector<uint32_t>& order, ThreadPool& pool) {
-    std::vector<Record> sorted(records_.size());
+    std::vector<Record> sorted(order.size());
     pool.forEach((order.size() + kChunkInstances - 1) / kChunkInstances, [&](size_t chunk, int) {
         const size_t begin = chunk * kChunkInstances,
                      end = std::min(order.size(), begin + kChunkInstances);

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <utility>
 #include <vector>
 
 namespace stipple {
@@ -18,6 +19,9 @@ struct ChildRef {
 
     static ChildRef mesh(uint32_t index) { return {index}; }
     static ChildRef group(uint32_t index) { return {index | 0x80000000u}; }
+    // An empty place in an InstanceStore.
+    static ChildRef none() { return {0x7fffffffu}; }
+    bool isNone() const { return bits == 0x7fffffffu; }
     bool isGroup() const { return bits >> 31; }
     uint32_t index() const { return bits & 0x7fffffffu; }
     bool operator==(const ChildRef& o) const { return bits == o.bits; }
@@ -45,31 +49,38 @@ public:
     bool isSimilarity(size_t i) const { return records_[i].scale != 0.0f; }
     // maxAreaScale() of groupFromChild(i).linear, without decoding the rotation.
     double areaScale(size_t i) const;
-    // Reorders: new record i is old record order[i].
+    // Editing. Places may be empty; loops over all must leave those out.
+    void set(size_t i, ChildRef child, const Affine& group_from_child);
+    void setChild(size_t i, ChildRef child) { records_[i].child = child; }
+    void erase(size_t i);
+    void swap(size_t i, size_t j) { std::swap(records_[i], records_[j]); }
+    void addEmpty(size_t n);
+    // Reorders: new record i is old record order[i]; those that order leaves out go.
     void permute(const std::vector<uint32_t>& order, ThreadPool& pool);
     size_t bytes() const {
         return records_.capacity() * sizeof(Record) + general_.capacity() * sizeof(Affine);
     }
 
 private:
-    void append(const InstanceStore& other);
-    void addGeneral(ChildRef child, const Affine& group_from_child);
-    // The nearest steps; false outside of the domain.
-    bool quantize(const DVec3& translation, int32_t (&position)[3]) const;
-
     // scale 0 marks an index into general_ (in position[0]).
     struct Record {
-        int32_t position[3];  // translation = origin_ + step_ * position
-        float rotation[3];    // x, y, z of a unit quaternion with w >= 0
-        float scale;          // uniform, negative: mirrored (all axes)
-        ChildRef child;
+        int32_t position[3] = {0, 0, 0};  // translation = origin_ + step_ * position
+        float rotation[3] = {0, 0, 0};    // x, y, z of a unit quaternion with w >= 0
+        float scale = 1.0f;               // uniform, negative: mirrored (all axes)
+        ChildRef child = ChildRef::none();
     };
     static_assert(sizeof(Record) == 32);
+
+    void append(const InstanceStore& other);
+    Record makeRecord(ChildRef child, const Affine& group_from_child);
+    // The nearest steps; false outside of the domain.
+    bool quantize(const DVec3& translation, int32_t (&position)[3]) const;
 
     DVec3 origin_;
     DVec3 step_;
     std::vector<Record> records_;
     std::vector<Affine> general_;
+    std::vector<uint32_t> free_general_;  // no record's
 };
 
 }  // namespace stipple

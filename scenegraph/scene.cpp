@@ -18,6 +18,7 @@ std::vector<uint32_t> childrenFirst(const Scene& scene) {
         const InstanceStore& instances = scene.groups[g].instances;
         for (size_t i = 0; i < instances.size(); ++i) {
             const ChildRef child = instances.child(i);
+            if (child.isNone()) continue;
             const size_t limit = child.isGroup() ? n : scene.meshes.size();
             if (child.index() >= limit) {
                 throw Error(ErrorCode::kInvalidScene, scene.path,
@@ -97,7 +98,7 @@ SceneSize sceneSize(const Scene& scene) {
     for (const Texture& t : scene.textures) size.bytes += t.bytes();
     if (scene.lighting.sky.environment) size.bytes += scene.lighting.sky.environment->bytes();
     for (const Group& g : scene.groups) {
-        size.stored_instances += double(g.instances.size());
+        size.stored_instances += g.nodes.empty() ? 0.0 : double(g.nodes[0].count);
         size.instance_bytes += g.bytes();
     }
     size.bytes += size.instance_bytes;
@@ -118,6 +119,7 @@ std::vector<double> meshInstances(const Scene& scene) {
         if (groups[*g] == 0.0) continue;
         for (size_t i = 0; i < instances.size(); ++i) {
             const ChildRef child = instances.child(i);
+            if (child.isNone()) continue;
             (child.isGroup() ? groups : meshes)[child.index()] += groups[*g];
         }
     }

@@ -34,9 +34,10 @@ struct Scene {
     const CameraPath* findPath(const std::string& name) const;
 };
 
-// Of an instance's child, which has been built.
+// Of an instance's child, which has been built: as in the sums of the groups that instance it.
 inline double childArea(const Scene& scene, ChildRef child) {
-    return child.isGroup() ? scene.groups[child.index()].area : scene.meshes[child.index()].area;
+    return child.isGroup() ? scene.groups[child.index()].as_child.area
+                           : scene.meshes[child.index()].area;
 }
 inline const Box3& nodeBounds(const Scene& scene, ChildRef child, uint32_t node) {
     return child.isGroup() ? scene.groups[child.index()].nodes[node].bounds

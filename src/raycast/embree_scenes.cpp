@@ -237,6 +237,7 @@ void EmbreeScenes::addPart(GroupScene& out, uint32_t index, const Affine& scene_
     uint32_t n_meshes = 0, n_groups = 0;
     for (uint32_t slot = 0; slot < n; ++slot) {
         const ChildRef child = instances.child(slot);
+        if (child.isNone()) continue;
         if (!child.isGroup()) {
             buildMesh(child.index());
             ++n_meshes;
@@ -253,6 +254,7 @@ void EmbreeScenes::addPart(GroupScene& out, uint32_t index, const Affine& scene_
         part.group_slots.reserve(n_groups);
         for (uint32_t slot = 0; slot < n; ++slot) {
             const ChildRef child = instances.child(slot);
+            if (child.isNone()) continue;
             if (!child.isGroup()) {
                 part.mesh_slots.push_back(slot);
             } else if (placed_[child.index()] > 1) {

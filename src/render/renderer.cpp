@@ -131,6 +131,13 @@ Renderer::Renderer(const Scene& scene, ThreadPool& pool)
     : impl_(std::make_unique<Impl>(scene, pool)) {}
 Renderer::~Renderer() = default;
 
+void Renderer::sceneChanged(const SceneChanges& changes) {
+    if (!changes.any) return;
+    impl_->sampler.sceneChanged(changes);
+    impl_->caster.reset();
+    if (changes.assets) impl_->rasterizer.reset();
+}
+
 Frame Renderer::render(const FrameRequest& asked) {
     Frame frame;
     FrameRequest request = asked;

@@ -6,6 +6,7 @@
 #include <core/parallel.h>
 #include <core/settings.h>
 #include <scenegraph/scene.h>
+#include <scenegraph/scene_editor.h>
 
 #include <cstdint>
 #include <functional>
@@ -66,6 +67,9 @@ public:
     // Throws Error(kCancelled) if cancelled, kInvalidArgument for impossible settings (zbuffer
     // above 10^9 triangles).
     Frame render(const FrameRequest& request);
+    // Call between frames when the scene has been edited (scenegraph/scene_editor.h). Point lists
+    // of what is as it was are kept; Embree's scene is built anew when rays are next cast.
+    void sceneChanged(const SceneChanges& changes);
 
 private:
     struct Impl;

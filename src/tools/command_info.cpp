@@ -46,7 +46,7 @@ Json infoJson(const Scene& scene, const std::vector<std::string>& warnings) {
         json["groups"].push_back({{"name", group.name},
                                   {"root", &group == &scene.groups[scene.root]},
                                   {"depth", group.depth},
-                                  {"instances_stored", group.instances.size()},
+                                  {"instances_stored", group.nodes[0].count},
                                   {"instances", jsonCount(group.instances_total)},
                                   {"triangles", jsonCount(group.triangles_total)}});
     }

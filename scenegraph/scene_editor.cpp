@@ -1,0 +1,595 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <scenegraph/scene_editor.h>
+
+#include <scenegraph/group_build.h>
+#include <scenegraph/group_sums.h>
+
+#include <bit>
+
+namespace stipple {
+
+namespace {
+
+constexpr uint32_t kGone = 0xffffffffu;
+constexpr uint32_t kMostResidents = 32;  // of a leaf, before it is split
+constexpr uint32_t kFewInstances = 12;   // below a node whose children are leaves: merged
+constexpr size_t kMostChanges = 1 << 16;
+
+uint64_t useKey(uint32_t child, uint32_t holder) { return uint64_t(child) << 32 | holder; }
+
+uint32_t placesOf(const GroupNode& node) { return node.resident_count + node.free_count; }
+
+uint32_t capacityFor(uint32_t count) { return std::bit_ceil(std::max(count, 4u)); }
+
+[[noreturn]] void refuse(const std::string& what) {
+    throw Error(ErrorCode::kInvalidArgument, "", what);
+}
+
+}  // namespace
+
+SceneEditor::SceneEditor(Scene& scene) : scene_(scene) {
+    open_.resize(scene.groups.size());
+    uses_.resize(scene.groups.size());
+    for (uint32_t g = 0; g < scene.groups.size(); ++g) {
+        const Group& group = scene.groups[g];
+        for (uint32_t i = 0; i < group.instances.size(); ++i) {
+            const ChildRef child = group.instances.child(i);
+            if (!child.isNone()) addUse({g, group.listed_index[i]}, child);
+        }
+    }
+}
+
+void SceneEditor::addUse(InstanceId place, ChildRef child) {
+    if (!child.isGroup()) return;
+    Uses& uses = uses_[child.index()];
+    if (++uses.count <= kFewUses) uses.places.push_back(place);
+    ++child_uses_[useKey(child.index(), place.group)];
+}
+
+void SceneEditor::removeUse(InstanceId place, ChildRef child) {
+    if (!child.isGroup()) return;
+    Uses& uses = uses_[child.index()];
+    --uses.count;
+    std::erase(uses.places, place);
+    const auto found = child_uses_.find(useKey(child.index(), place.group));
+    if (--found->second == 0) child_uses_.erase(found);
+}
+
+SceneEditor::OpenGroup& SceneEditor::opened(uint32_t index) {
+    if (index >= open_.size())
+        refuse("there is no group " + std::to_string(index) + " in this scene");
+    if (open_[index]) return *open_[index];
+    const Group& group = scene_.groups[index];
+    auto open = std::make_unique<OpenGroup>();
+    const size_t n = group.instances.size();
+    open->parent.assign(group.nodes.size(), 0);
+    open->node_of.assign(n, 0);
+    open->slot_of.assign(group.next_index, kGone);
+    for (uint32_t i = 0; i < n; ++i) open->slot_of[group.listed_index[i]] = i;
+    for (uint32_t i = 0; i < group.nodes.size(); ++i) {
+        const GroupNode& node = group.nodes[i];
+        for (uint32_t c = 0; c < node.child_count; ++c) open->parent[node.first_child + c] = i;
+        for (uint32_t r = 0; r < node.resident_count; ++r) open->node_of[node.first + r] = i;
+    }
+    open->free_places.resize(33);
+    open->free_nodes.resize(9);
+    open_[index] = std::move(open);
+    return *open_[index];
+}
+
+void SceneEditor::open(uint32_t group) { opened(group); }
+
+bool SceneEditor::contains(InstanceId id) {
+    if (id.group >= scene_.groups.size()) return false;
+    const OpenGroup& open = opened(id.group);
+    return id.index < open.slot_of.size() && open.slot_of[id.index] != kGone;
+}
+
+uint32_t SceneEditor::slotOf(InstanceId id) {
+    if (!contains(id)) {
+        refuse("there is no instance " + std::to_string(id.index) + " in group \"" +
+               (id.group < scene_.groups.size() ? scene_.groups[id.group].name : "?") + "\"");
+    }
+    return open_[id.group]->slot_of[id.index];
+}
+
+ChildRef SceneEditor::child(InstanceId id) {
+    const uint32_t slot = slotOf(id);
+    return scene_.groups[id.group].instances.child(slot);
+}
+
+Affine SceneEditor::groupFromChild(InstanceId id) {
+    const uint32_t slot = slotOf(id);
+    return scene_.groups[id.group].instances.groupFromChild(slot);
+}
+
+bool SceneEditor::reaches(ChildRef from, uint32_t group) const {
+    if (!from.isGroup()) return false;
+    std::vector<uint32_t> stack{from.index()};
+    std::vector<bool> seen(scene_.groups.size(), false);
+    while (!stack.empty()) {
+        const uint32_t g = stack.back();
+        stack.pop_back();
+        if (g == group) return true;
+        if (seen[g]) continue;
+        seen[g] = true;
+        for (const auto& [key, count] : child_uses_) {
+            if (uint32_t(key) == g) stack.push_back(uint32_t(key >> 32));
+        }
+    }
+    return false;
+}
+
+void SceneEditor::checkInsert(uint32_t group, ChildRef child, const Affine& transform) const {
+    if (group >= scene_.groups.size())
+        refuse("there is no group " + std::to_string(group) + " in this scene");
+    if (child.isNone() ||
+        child.index() >= (child.isGroup() ? scene_.groups.size() : scene_.meshes.size()))
+        refuse("there is nothing of this kind to insert");
+    if (!isFinite(transform)) refuse("the transform is not finite");
+    const double length = maxLengthScale(transform.linear);
+    if (!(std::abs(glm::determinant(transform.linear)) > 1e-12 * length * length * length))
+        refuse("the transform is singular: it flattens what it places");
+    if (child.isGroup()) {
+        if (reaches(child, group))
+            refuse("group \"" + scene_.groups[child.index()].name + "\" contains \"" +
+                   scene_.groups[group].name + "\" already");
+        if (scene_.groups[child.index()].depth + scene_.groups[scene_.root].depth > kDeepestNesting)
+            refuse("groups would be nested more than " + std::to_string(kDeepestNesting) + " deep");
+    }
+}
+
+InstanceId SceneEditor::insert(uint32_t group, ChildRef child, const Affine& group_from_child) {
+    checkInsert(group, child, group_from_child);
+    OpenGroup& open = opened(group);
+    const InstanceId id{group, scene_.groups[group].next_index};
+    if (id.index == kGone) refuse("more than 2^32 instances have been in this group");
+    ++scene_.groups[group].next_index;
+    open.slot_of.push_back(kGone);
+    place(id, child, group_from_child);
+    return id;
+}
+
+void SceneEditor::restore(InstanceId id, ChildRef child, const Affine& group_from_child) {
+    checkInsert(id.group, child, group_from_child);
+    if (id.index >= opened(id.group).slot_of.size() || contains(id))
+        refuse("instance " + std::to_string(id.index) + " was not removed");
+    place(id, child, group_from_child);
+}
+
+void SceneEditor::remove(InstanceId id) {
+    slotOf(id);
+    take(id);
+}
+
+void SceneEditor::move(InstanceId id, const Affine& group_from_child) {
+    const ChildRef what = child(id);
+    checkInsert(id.group, ChildRef::mesh(0), group_from_child);
+    take(id);
+    place(id, what, group_from_child);
+}
+
+void SceneEditor::replace(InstanceId id, ChildRef child) {
+    const Affine where = groupFromChild(id);
+    checkInsert(id.group, child, where);
+    take(id);
+    place(id, child, where);
+}
+
+InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewInstance>& instances,
+                                   ThreadPool& pool) {
+    for (const NewInstance& i : instances) checkInsert(group_index, i.child, i.group_from_child);
+    opened(group_index);
+    Group& group = scene_.groups[group_index];
+    const InstanceId first{group_index, group.next_index};
+    if (uint64_t(first.index) + instances.size() >= kGone)
+        refuse("more than 2^32 instances have been in this group");
+    // Building costs about as much an instance as a tenth of an insert.
+    if (instances.size() * 10 < group.nodes[0].count) {
+        for (const NewInstance& i : instances) insert(group_index, i.child, i.group_from_child);
+        return first;
+    }
+    const double instances_before = group.instances_total, triangles_before = group.triangles_total;
+    for (const NewInstance& i : instances) {
+        addUse({group_index, group.next_index}, i.child);
+        group.instances.add(i.child, i.group_from_child);
+        group.listed_index.push_back(group.next_index++);
+    }
+    const ChildSums as_child = group.as_child;
+    buildGroup(scene_, group, scene_.path + ": /groups/" + group.name, pool);
+    group.as_child = as_child;
+    open_[group_index].reset();
+    opened(group_index);
+    changes_.all_nodes = changes_.any = true;
+    const double more_instances = group.instances_total - instances_before,
+                 more_triangles = group.triangles_total - triangles_before;
+    group.instances_total = instances_before, group.triangles_total = triangles_before;
+    countInstances(group_index, more_instances, more_triangles);
+    groupChanged(group_index);
+    return first;
+}
+
+ChildRef SceneEditor::addMesh(Mesh mesh) {
+    buildMesh(mesh, scene_.materials, mesh.name);
+    scene_.meshes.push_back(std::move(mesh));
+    changes_.assets = changes_.any = true;
+    return ChildRef::mesh(uint32_t(scene_.meshes.size() - 1));
+}
+
+InstanceId SceneEditor::find(const std::vector<uint32_t>& path) {
+    if (path.empty()) refuse("an empty path names no instance");
+    InstanceId id{scene_.root, path[0]};
+    for (size_t i = 0;; ++i) {
+        id.index = path[i];
+        const ChildRef below = child(id);  // throws
+        if (i + 1 == path.size()) return id;
+        if (!below.isGroup())
+            refuse("instance " + std::to_string(path[i]) + " is no group, it has nothing below");
+        id.group = below.index();
+    }
+}
+
+InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
+    find(path);  // throws before anything is copied
+    InstanceId id{scene_.root, path[0]};
+    for (size_t i = 0;; ++i) {
+        id.index = path[i];
+        if (i + 1 == path.size()) return id;
+        ChildRef below = child(id);
+        if (uses_[below.index()].count > 1) {
+            const uint32_t copy = uint32_t(scene_.groups.size());
+            scene_.groups.push_back(scene_.groups[below.index()]);
+            const OpenGroup* source = open_[below.index()].get();
+            open_.push_back(source ? std::make_unique<OpenGroup>(*source) : nullptr);
+            uses_.emplace_back();
+            Group& group = scene_.groups[copy];
+            group.as_child = {group.bounds, group.area, group.max_triangle_area};
+            for (uint32_t k = 0; k < group.instances.size(); ++k) {
+                const ChildRef inner = group.instances.child(k);
+                if (!inner.isNone()) addUse({copy, group.listed_index[k]}, inner);
+            }
+            const uint32_t slot = slotOf(id);
+            removeUse(id, below);
+            below = ChildRef::group(copy);
+            scene_.groups[id.group].instances.setChild(slot, below);
+            addUse(id, below);
+            changes_.assets = changes_.any = true;
+            refreshUpwards(id.group, open_[id.group]->node_of[slot]);
+        }
+        id.group = below.index();
+    }
+}
+
+void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_child) {
+    addUse(id, child);
+    DVec3 center, half;
+    instanceBox(childSums(scene_, child), group_from_child, center, half);
+    const uint32_t node = chooseNode(scene_.groups[id.group], center, half);
+    addResident(id.group, node, id.index, child, group_from_child);
+    if (scene_.groups[id.group].nodes[node].child_count == 0 &&
+        scene_.groups[id.group].nodes[node].resident_count > kMostResidents)
+        split(id.group, node);
+    const bool is_group = child.isGroup();
+    countInstances(id.group, is_group ? scene_.groups[child.index()].instances_total : 1.0,
+                   is_group ? scene_.groups[child.index()].triangles_total
+                            : double(scene_.meshes[child.index()].triangles.size()));
+    if (is_group) {
+        int& depth = scene_.groups[id.group].depth;
+        depth = std::max(depth, scene_.groups[child.index()].depth + 1);
+    }
+    refreshUpwards(id.group, node);
+}
+
+void SceneEditor::take(InstanceId id) {
+    OpenGroup& open = *open_[id.group];
+    Group& group = scene_.groups[id.group];
+    const uint32_t slot = open.slot_of[id.index], node_index = open.node_of[slot];
+    const ChildRef child = group.instances.child(slot);
+    removeUse(id, child);
+    const bool is_group = child.isGroup();
+    countInstances(id.group, is_group ? -scene_.groups[child.index()].instances_total : -1.0,
+                   is_group ? -scene_.groups[child.index()].triangles_total
+                            : -double(scene_.meshes[child.index()].triangles.size()));
+    GroupNode& node = group.nodes[node_index];
+    const uint32_t last = node.first + node.resident_count - 1;
+    group.instances.erase(slot);
+    if (slot != last) {
+        group.instances.swap(slot, last);
+        group.listed_index[slot] = group.listed_index[last];
+        open.slot_of[group.listed_index[slot]] = slot;
+    }
+    open.slot_of[id.index] = kGone;
+    --node.resident_count;
+    if (node.free_count < 0xffff) ++node.free_count;
+    // Few below the parent: one leaf again.
+    const uint32_t parent = open.parent[node_index];
+    uint32_t start = node_index;
+    if (node_index != 0 && node.child_count == 0 && group.nodes[parent].count <= kFewInstances) {
+        const GroupNode& p = group.nodes[parent];
+        bool has_leaves = true;
+        for (uint32_t c = 0; c < p.child_count; ++c)
+            has_leaves &= group.nodes[p.first_child + c].child_count == 0;
+        if (has_leaves) {
+            mergeChildren(id.group, parent);
+            start = parent;
+        }
+    }
+    refreshUpwards(id.group, start);
+}
+
+// Down to the child that must grow least; what is about as large as a node stays in it.
+uint32_t SceneEditor::chooseNode(const Group& group, const DVec3& center, const DVec3& half) const {
+    uint32_t index = 0;
+    const Vec3 lo = Vec3(center - half), hi = Vec3(center + half);
+    const float size = float(2.0 * glm::length(half));
+    for (;;) {
+        const GroupNode& node = group.nodes[index];
+        if (node.child_count == 0) return index;
+        const bool is_full = node.resident_count > kMostResidents;
+        if (!is_full && size > 0.5f * glm::length(node.bounds.extent())) return index;
+        float least = kInfinity;
+        for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c) {
+            const Box3& b = group.nodes[c].bounds;
+            float growth = 0.0f;  // of the sum of its sides; then what is nearest
+            if (!b.isEmpty()) {
+                const Vec3 extent = glm::max(b.max, hi) - glm::min(b.min, lo) - b.extent();
+                growth =
+                    extent.x + extent.y + extent.z + 1e-6f * glm::length(b.center() - Vec3(center));
+            } else {
+                growth = size;
+            }
+            if (growth < least) least = growth, index = c;
+        }
+    }
+}
+
+// capacity: places of a power of two are used again.
+uint32_t SceneEditor::takePlaces(uint32_t group_index, uint32_t capacity) {
+    OpenGroup& open = *open_[group_index];
+    Group& group = scene_.groups[group_index];
+    std::vector<uint32_t>& free = open.free_places[size_t(std::countr_zero(capacity))];
+    if (std::has_single_bit(capacity) && !free.empty()) {
+        const uint32_t first = free.back();
+        free.pop_back();
+        return first;
+    }
+    const uint32_t first = uint32_t(group.instances.size());
+    group.instances.addEmpty(capacity);
+    group.listed_index.resize(first + capacity, kGone);
+    open.node_of.resize(first + capacity, kGone);
+    return first;
+}
+
+void SceneEditor::freePlaces(uint32_t group, uint32_t first, uint32_t capacity) {
+    // Places from building come in any number: in pieces.
+    while (capacity > 0) {
+        const uint32_t piece = std::bit_floor(capacity);
+        open_[group]->free_places[size_t(std::countr_zero(piece))].push_back(first);
+        first += piece;
+        capacity -= piece;
+    }
+}
+
+// The residents of a node move to free places `to`.
+void SceneEditor::moveResidents(uint32_t group_index, uint32_t node_index, uint32_t to) {
+    OpenGroup& open = *open_[group_index];
+    Group& group = scene_.groups[group_index];
+    const GroupNode& node = group.nodes[node_index];
+    for (uint32_t i = 0; i < node.resident_count; ++i) {
+        const uint32_t from = node.first + i;
+        group.instances.swap(from, to + i);
+        group.listed_index[to + i] = group.listed_index[from];
+        open.slot_of[group.listed_index[to + i]] = to + i;
+        open.node_of[to + i] = node_index;
+    }
+}
+
+void SceneEditor::addResident(uint32_t group_index, uint32_t node_index, uint32_t name,
+                              ChildRef child, const Affine& group_from_child) {
+    OpenGroup& open = *open_[group_index];
+    Group& group = scene_.groups[group_index];
+    if (group.nodes[node_index].free_count == 0) {
+        const uint32_t count = group.nodes[node_index].resident_count;
+        const uint32_t capacity = std::min(capacityFor(count + 1), count + 0x8000);
+        const uint32_t to = takePlaces(group_index, capacity);
+        moveResidents(group_index, node_index, to);
+        GroupNode& node = group.nodes[node_index];
+        freePlaces(group_index, node.first, count);
+        node.first = to;
+        node.free_count = uint16_t(capacity - count);
+    }
+    GroupNode& node = group.nodes[node_index];
+    --node.free_count;
+    const uint32_t slot = node.first + node.resident_count++;
+    group.instances.set(slot, child, group_from_child);
+    group.listed_index[slot] = name;
+    open.slot_of[name] = slot;
+    open.node_of[slot] = node_index;
+}
+
+uint32_t SceneEditor::takeNodes(uint32_t group_index, uint32_t count) {
+    OpenGroup& open = *open_[group_index];
+    Group& group = scene_.groups[group_index];
+    std::vector<uint32_t>& free = open.free_nodes[count];
+    if (!free.empty()) {
+        const uint32_t first = free.back();
+        free.pop_back();
+        return first;
+    }
+    const uint32_t first = uint32_t(group.nodes.size());
+    group.nodes.resize(first + count);
+    open.parent.resize(first + count, 0);
+    return first;
+}
+
+// A leaf's residents go to children, by the octant of their centres about the mean.
+void SceneEditor::split(uint32_t group_index, uint32_t node_index) {
+    OpenGroup& open = *open_[group_index];
+    Group& group = scene_.groups[group_index];
+    const uint32_t n = group.nodes[node_index].resident_count,
+                   first = group.nodes[node_index].first;
+    std::vector<DVec3> centers(n);
+    DVec3 mean(0.0);
+    for (uint32_t i = 0; i < n; ++i) {
+        DVec3 half;
+        instanceBox(childSums(scene_, group.instances.child(first + i)),
+                    group.instances.groupFromChild(first + i), centers[i], half);
+        mean += centers[i] / double(n);
+    }
+    std::vector<uint32_t> octants[8];
+    for (uint32_t i = 0; i < n; ++i) {
+        const DVec3& c = centers[i];
+        octants[(c.x > mean.x) | (c.y > mean.y) << 1 | (c.z > mean.z) << 2].push_back(i);
+    }
+    uint32_t child_count = 0;
+    for (const auto& octant : octants) child_count += !octant.empty();
+    if (child_count < 2) return;  // all in one place
+    const uint32_t first_child = takeNodes(group_index, child_count);
+    uint32_t c = first_child;
+    for (const auto& octant : octants) {
+        if (octant.empty()) continue;
+        GroupNode child;
+        const uint32_t capacity = capacityFor(uint32_t(octant.size()));
+        child.first = takePlaces(group_index, capacity);
+        child.free_count = uint16_t(capacity - octant.size());
+        for (const uint32_t i : octant) {
+            const uint32_t from = first + i, to = child.first + child.resident_count++;
+            group.instances.swap(from, to);
+            group.listed_index[to] = group.listed_index[from];
+            open.slot_of[group.listed_index[to]] = to;
+            open.node_of[to] = c;
+        }
+        open.parent[c] = node_index;
+        group.nodes[c] = child;
+        accumulateNode(
+            group, group.nodes, [&](ChildRef r) { return childSums(scene_, r); }, group.nodes[c]);
+        note(group_index, c);
+        ++c;
+    }
+    GroupNode& node = group.nodes[node_index];
+    freePlaces(group_index, node.first, placesOf(node));
+    node.first = node.resident_count = 0;
+    node.free_count = 0;
+    node.first_child = first_child;
+    node.child_count = uint8_t(child_count);
+}
+
+void SceneEditor::mergeChildren(uint32_t group_index, uint32_t node_index) {
+    OpenGroup& open = *open_[group_index];
+    Group& group = scene_.groups[group_index];
+    const uint32_t first_child = group.nodes[node_index].first_child,
+                   child_count = group.nodes[node_index].child_count;
+    for (uint32_t c = first_child; c < first_child + child_count; ++c) {
+        const uint32_t first = group.nodes[c].first, places = placesOf(group.nodes[c]);
+        for (uint32_t slot = first; slot < first + group.nodes[c].resident_count; ++slot) {
+            const uint32_t name = group.listed_index[slot];
+            const ChildRef child = group.instances.child(slot);
+            const Affine where = group.instances.groupFromChild(slot);
+            group.instances.erase(slot);
+            addResident(group_index, node_index, name, child, where);
+        }
+        freePlaces(group_index, first, places);
+        group.nodes[c] = GroupNode();
+        note(group_index, c);
+    }
+    open.free_nodes[child_count].push_back(first_child);
+    group.nodes[node_index].first_child = 0;
+    group.nodes[node_index].child_count = 0;
+}
+
+void SceneEditor::note(uint32_t group, uint32_t node) {
+    changes_.any = true;
+    if (changes_.all_nodes) return;
+    changes_.nodes.push_back({group, node});
+    if (changes_.nodes.size() > kMostChanges) {
+        changes_.all_nodes = true;
+        changes_.nodes.clear();
+    }
+}
+
+void SceneEditor::refreshUpwards(uint32_t group_index, uint32_t node_index) {
+    OpenGroup& open = *open_[group_index];
+    Group& group = scene_.groups[group_index];
+    for (;;) {
+        accumulateNode(
+            group, group.nodes, [&](ChildRef r) { return childSums(scene_, r); },
+            group.nodes[node_index]);
+        note(group_index, node_index);
+        if (node_index == 0) break;
+        node_index = open.parent[node_index];
+    }
+    const GroupNode& root = group.nodes[0];
+    group.area = root.area;
+    group.max_triangle_area = root.max_triangle_area;
+    group.bounds =
+        root.area > 0.0 ? DBox3{DVec3(root.bounds.min), DVec3(root.bounds.max)} : DBox3();
+    groupChanged(group_index);
+}
+
+// Lets the groups that instance it know.
+void SceneEditor::groupChanged(uint32_t index) {
+    Group& group = scene_.groups[index];
+    const ChildSums now = {group.bounds, group.area, group.max_triangle_area};
+    const Uses uses = uses_[index];
+    if (uses.count == 0) {
+        group.as_child = now;
+    } else if (uses.count <= kFewUses && uses.places.size() == uses.count) {
+        group.as_child = now;
+        for (const InstanceId& use : uses.places) {
+            const uint32_t slot = slotOf(use);
+            refreshUpwards(use.group, open_[use.group]->node_of[slot]);
+        }
+    } else {
+        const ChildSums& was = group.as_child;
+        const bool fits = now.bounds.isEmpty() ||
+                          (!was.bounds.isEmpty() &&
+                           glm::all(glm::greaterThanEqual(now.bounds.min, was.bounds.min)) &&
+                           glm::all(glm::lessThanEqual(now.bounds.max, was.bounds.max)));
+        if (fits && now.max_triangle_area <= was.max_triangle_area && now.area <= 2.0 * was.area &&
+            now.area >= 0.5 * was.area)
+            return;
+        group.as_child = now;
+        std::vector<uint32_t> holders;
+        for (const auto& [key, count] : child_uses_) {
+            if (uint32_t(key >> 32) == index) holders.push_back(uint32_t(key));
+        }
+        std::sort(holders.begin(), holders.end());
+        for (const uint32_t holder : holders) refreshAll(holder);
+    }
+}
+
+// All nodes anew, children before parents.
+void SceneEditor::refreshAll(uint32_t group_index) {
+    Group& group = scene_.groups[group_index];
+    std::vector<uint32_t> order{0};
+    for (size_t i = 0; i < order.size(); ++i) {
+        const GroupNode& node = group.nodes[order[i]];
+        for (uint32_t c = 0; c < node.child_count; ++c) order.push_back(node.first_child + c);
+    }
+    for (size_t i = order.size(); i-- > 1;) {
+        accumulateNode(
+            group, group.nodes, [&](ChildRef r) { return childSums(scene_, r); },
+            group.nodes[order[i]]);
+        note(group_index, order[i]);
+    }
+    opened(group_index);
+    refreshUpwards(group_index, 0);
+}
+
+// Numbers for people: in all groups above, too.
+void SceneEditor::countInstances(uint32_t index, double instances, double triangles) {
+    scene_.groups[index].instances_total += instances;
+    scene_.groups[index].triangles_total += triangles;
+    std::vector<std::pair<uint32_t, size_t>> holders;
+    if (uses_[index].count > 0) {
+        for (const auto& [key, count] : child_uses_) {
+            if (uint32_t(key >> 32) == index) holders.emplace_back(uint32_t(key), count);
+        }
+    }
+    for (const auto& [holder, count] : holders)
+        countInstances(holder, instances * double(count), triangles * double(count));
+}
+
+SceneChanges SceneEditor::takeChanges() { return std::exchange(changes_, {}); }
+
+}  // namespace stipple

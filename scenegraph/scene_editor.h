@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// Edits of a built scene: instances come, go and move, and the sums along their path to the root
+// follow at once. Based on: Wand et al. 2001 ("Dynamic Distribution Lists": insertion and removal
+// in O(height of the octree)).
+#pragma once
+
+#include <scenegraph/scene.h>
+
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+namespace stipple {
+
+// An instance: the group that holds it and the instance's Group::listed_index there.
+struct InstanceId {
+    uint32_t group = 0;
+    uint32_t index = 0;
+    bool operator==(const InstanceId&) const = default;
+};
+
+// What has changed since it was last asked for; caches follow.
+struct SceneChanges {
+    struct Node {
+        uint32_t group = 0, node = 0;
+    };
+    std::vector<Node> nodes;  // of groups: the instances below are others, or elsewhere
+    bool all_nodes = false;   // too many to tell
+    bool assets = false;      // meshes or groups have come
+    bool any = false;
+};
+
+// One at a time for a scene, and no frame at the same time. A group that is instanced many times
+// changes everywhere at once; ownGroup() makes a copy for one place. Indices that are not there, or
+// not any more, singular transforms and groups that would contain themselves throw
+// kInvalidArgument; then nothing has changed.
+class SceneEditor {
+public:
+    // O(stored instances), once.
+    explicit SceneEditor(Scene& scene);
+
+    // O(log n), and O(n) for the first edit of a group. A group's bounds grow in the groups that
+    // instance it: O(log n) for each of the places, up to kFewUses of them; beyond, only when they
+    // have grown, or its area has doubled or halved, and then O(n) of the groups that instance it.
+    InstanceId insert(uint32_t group, ChildRef child, const Affine& group_from_child);
+    void remove(InstanceId id);
+    void move(InstanceId id, const Affine& group_from_child);
+    void replace(InstanceId id, ChildRef child);
+    // A removed instance again, under its name.
+    void restore(InstanceId id, ChildRef child, const Affine& group_from_child);
+
+    struct NewInstance {
+        ChildRef child;
+        Affine group_from_child;
+    };
+    // As many inserts, the group's octree built anew where that is less work: O(n log n). Their
+    // names are consecutive; the first is returned.
+    InstanceId insertMany(uint32_t group, const std::vector<NewInstance>& instances,
+                          ThreadPool& pool);
+
+    bool contains(InstanceId id);
+    ChildRef child(InstanceId id);
+    Affine groupFromChild(InstanceId id);
+
+    // Names along the path from the root's instance down.
+    InstanceId find(const std::vector<uint32_t>& path);
+    // The same, but groups along the path that are instanced elsewhere are copied for this place:
+    // what is changed there changes nowhere else. O(instances of those groups).
+    InstanceId findOwn(const std::vector<uint32_t>& path);
+
+    // Meshes as loaders make them, with materials of the scene; they are built. Returns the first.
+    ChildRef addMesh(Mesh mesh);
+
+    // Makes a group's first edit as fast as the others. O(n).
+    void open(uint32_t group);
+
+    const Scene& scene() const { return scene_; }
+    SceneChanges takeChanges();
+
+    static constexpr size_t kFewUses = 16;
+
+private:
+    // What editing must know of a group beside its octree.
+    struct OpenGroup {
+        std::vector<uint32_t> parent;                    // of each node
+        std::vector<uint32_t> slot_of;                   // by name; kGone
+        std::vector<uint32_t> node_of;                   // by place
+        std::vector<std::vector<uint32_t>> free_places;  // by the binary logarithm of their number
+        std::vector<std::vector<uint32_t>> free_nodes;   // blocks of siblings, by their number
+    };
+    // How often a group is instanced, and where, if that is not often.
+    struct Uses {
+        size_t count = 0;
+        std::vector<InstanceId> places;
+    };
+
+    OpenGroup& opened(uint32_t group);
+    uint32_t slotOf(InstanceId id);
+    void checkInsert(uint32_t group, ChildRef child, const Affine& group_from_child) const;
+    bool reaches(ChildRef from, uint32_t group) const;
+    void addUse(InstanceId place, ChildRef child);
+    void removeUse(InstanceId place, ChildRef child);
+
+    void place(InstanceId id, ChildRef child, const Affine& group_from_child);
+    void take(InstanceId id);
+    uint32_t chooseNode(const Group& group, const DVec3& center, const DVec3& half) const;
+    void addResident(uint32_t group, uint32_t node, uint32_t name, ChildRef child,
+                     const Affine& group_from_child);
+    void moveResidents(uint32_t group, uint32_t from, uint32_t to);
+    uint32_t takePlaces(uint32_t group, uint32_t capacity);
+    void freePlaces(uint32_t group, uint32_t first, uint32_t capacity);
+    uint32_t takeNodes(uint32_t group, uint32_t count);
+    void split(uint32_t group, uint32_t node);
+    void mergeChildren(uint32_t group, uint32_t node);
+    void refreshUpwards(uint32_t group, uint32_t node);
+    void groupChanged(uint32_t group);
+    void refreshAll(uint32_t group);
+    void countInstances(uint32_t group, double instances, double triangles);
+    void note(uint32_t group, uint32_t node);
+
+    Scene& scene_;
+    std::vector<std::unique_ptr<OpenGroup>> open_;     // by group
+    std::vector<Uses> uses_;                           // by group
+    std::unordered_map<uint64_t, size_t> child_uses_;  // by child group and the group that holds it
+    SceneChanges changes_;
+};
+
+}  // namespace stipple

@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: Apache-2.0
+// Edits: whatever is done to a scene, its octrees are as good as those of a scene built so.
+#include <scenegraph/scene_editor.h>
+
+#include <core/rng.h>
+#include <gtest/gtest.h>
+#include <sampling/list_point.h>
+#include <sampling/point_list.h>
+#include <scenegraph/group_sums.h>
+#include <scenegraph/procedural/generators.h>
+
+#include <cstring>
+#include <map>
+
+namespace stipple {
+namespace {
+
+Affine randomPlace(Rng& rng, double spread) {
+    const double size = std::exp2(rng.uniform(-3.0, 2.0)), angle = rng.uniform(0.0, 6.0);
+    const double s = std::sin(angle) * size, c = std::cos(angle) * size;
+    DMat3 m(c, 0, -s, 0, size, 0, s, 0, c);
+    if (rng.uniform(0.0, 1.0) < 0.1) m[1] *= 2.5;  // no similarity
+    return {m, DVec3(rng.uniform(-spread, spread), rng.uniform(-5.0, 5.0),
+                     rng.uniform(-spread, spread))};
+}
+
+// Group 0, the root, holds boxes and spheres and `tiles` instances of group 1, which holds some
+// more.
+Scene makeScene(size_t n, size_t tiles) {
+    Scene scene;
+    scene.path = "test";
+    GeneratedMesh box = makePrimitive("box", 12, Vec3(0.5f));
+    scene.materials = box.materials;
+    scene.meshes.push_back(box.mesh);
+    scene.meshes.push_back(makePrimitive("sphere", 100, Vec3(0.5f)).mesh);
+    Rng rng{3};
+    Group root, tile;
+    root.name = "root";
+    tile.name = "tile";
+    root.instances = InstanceStore(DBox3{DVec3(-500), DVec3(500)});
+    tile.instances = InstanceStore(DBox3{DVec3(-20), DVec3(20)});
+    for (size_t i = 0; i < n; ++i)
+        root.instances.add(ChildRef::mesh(uint32_t(i % 2)), randomPlace(rng, 500.0));
+    for (size_t i = 0; i < tiles; ++i)
+        root.instances.add(ChildRef::group(1), {DMat3(1.0), DVec3(40.0 * double(i), 0, 600)});
+    for (size_t i = 0; i < 60; ++i)
+        tile.instances.add(ChildRef::mesh(uint32_t(i % 2)), randomPlace(rng, 20.0));
+    scene.groups = {root, tile};
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    return scene;
+}
+
+int treeDepth(const Group& group, uint32_t node = 0) {
+    int depth = 0;
+    for (uint32_t c = 0; c < group.nodes[node].child_count; ++c)
+        depth = std::max(depth, treeDepth(group, group.nodes[node].first_child + c));
+    return depth + 1;
+}
+
+// Every instance resides once, nodes enclose and sum up what is below. Returns how many there are.
+size_t checkOctree(const Scene& scene, const Group& group) {
+    std::map<uint32_t, int> names;
+    std::vector<uint32_t> open{0};
+    while (!open.empty()) {
+        const GroupNode& node = group.nodes[open.back()];
+        open.pop_back();
+        double area = 0.0;
+        uint32_t count = node.resident_count;
+        for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
+            const ChildRef child = group.instances.child(i);
+            EXPECT_FALSE(child.isNone());
+            ++names[group.listed_index[i]];
+            DVec3 center, half;
+            const ChildSums sums = childSums(scene, child);
+            instanceBox(sums, group.instances.groupFromChild(i), center, half);
+            for (int axis = 0; axis < 3; ++axis) {
+                EXPECT_GE(center[axis] - half[axis], double(node.bounds.min[axis]) - 1e-9);
+                EXPECT_LE(center[axis] + half[axis], double(node.bounds.max[axis]) + 1e-9);
+            }
+            area += sums.area * group.instances.areaScale(i);
+        }
+        for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c) {
+            const GroupNode& child = group.nodes[c];
+            area += child.area;
+            count += child.count;
+            if (child.area > 0.0) {
+                EXPECT_TRUE(glm::all(glm::lessThanEqual(node.bounds.min, child.bounds.min)));
+                EXPECT_TRUE(glm::all(glm::greaterThanEqual(node.bounds.max, child.bounds.max)));
+            }
+            open.push_back(c);
+        }
+        EXPECT_EQ(count, node.count);
+        EXPECT_NEAR(node.area, area, 1e-12 * area);
+    }
+    size_t live = 0;
+    for (size_t i = 0; i < group.instances.size(); ++i) live += !group.instances.child(i).isNone();
+    EXPECT_EQ(names.size(), live);
+    for (const auto& [name, n] : names) EXPECT_EQ(n, 1) << name;
+    return names.size();
+}
+
+// The same instances, built.
+Scene builtAnew(const Scene& scene) {
+    Scene fresh = scene;
+    ThreadPool pool(2);
+    buildScene(fresh, pool);
+    return fresh;
+}
+
+// Keeps to what is alive.
+void editAtRandom(SceneEditor& editor, std::vector<InstanceId>& alive, uint32_t group, int count,
+                  double spread, Rng& rng) {
+    for (int i = 0; i < count; ++i) {
+        const double what = rng.uniform(0.0, 1.0);
+        const size_t k =
+            std::min(alive.size() - 1, size_t(rng.uniform(0.0, 1.0) * double(alive.size())));
+        if (what < 0.34) {
+            alive.push_back(
+                editor.insert(group, ChildRef::mesh(uint32_t(i % 2)), randomPlace(rng, spread)));
+        } else if (what < 0.67 && alive.size() > 10) {
+            editor.remove(alive[k]);
+            alive[k] = alive.back();
+            alive.pop_back();
+        } else if (what < 0.95) {
+            editor.move(alive[k], randomPlace(rng, spread));
+        } else {
+            editor.replace(alive[k], ChildRef::mesh(uint32_t(i % 2)));
+        }
+    }
+}
+
+std::vector<InstanceId> idsOf(const Scene& scene, uint32_t group) {
+    std::vector<InstanceId> ids;
+    for (size_t i = 0; i < scene.groups[group].instances.size(); ++i) {
+        const ChildRef child = scene.groups[group].instances.child(i);
+        if (!child.isNone() && !child.isGroup())
+            ids.push_back({group, scene.groups[group].listed_index[i]});
+    }
+    return ids;
+}
+
+TEST(SceneEditor, afterManyEditsTheOctreeIsAsGoodAsOneBuilt) {
+    Scene scene = makeScene(3000, 5);
+    SceneEditor editor(scene);
+    Rng rng{7};
+    std::vector<InstanceId> alive = idsOf(scene, 0);
+    for (int round = 0; round < 5; ++round) {
+        editAtRandom(editor, alive, 0, 20000, 500.0, rng);
+        EXPECT_EQ(checkOctree(scene, scene.groups[0]), alive.size() + 5);
+    }
+    const Scene fresh = builtAnew(scene);
+    const Group &a = scene.groups[0], &b = fresh.groups[0];
+    EXPECT_NEAR(a.area, b.area, 1e-9 * b.area);
+    EXPECT_EQ(a.instances_total, b.instances_total);
+    EXPECT_EQ(a.triangles_total, b.triangles_total);
+    EXPECT_LE(treeDepth(a), 2 * treeDepth(b));
+    EXPECT_LE(a.nodes.size(), 4 * b.nodes.size());
+    EXPECT_LE(a.instances.size(), 4 * b.instances.size()) << "places are used again";
+    for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_NEAR(a.bounds.min[axis], b.bounds.min[axis], 1e-3);
+        EXPECT_NEAR(a.bounds.max[axis], b.bounds.max[axis], 1e-3);
+    }
+}
+
+TEST(SceneEditor, removedInstancesAreRefusedAndCanComeBack) {
+    Scene scene = makeScene(100, 0);
+    SceneEditor editor(scene);
+    const double area = scene.groups[0].area;
+    const InstanceId id{0, 17};
+    const Affine where = editor.groupFromChild(id);
+    const ChildRef what = editor.child(id);
+    editor.remove(id);
+    EXPECT_FALSE(editor.contains(id));
+    EXPECT_THROW(editor.remove(id), Error);
+    EXPECT_THROW(editor.move(id, where), Error);
+    EXPECT_LT(scene.groups[0].area, area);
+    const InstanceId other = editor.insert(0, what, where);
+    EXPECT_EQ(other.index, 100u) << "names are never given twice";
+    editor.remove(other);
+    editor.restore(id, what, where);
+    EXPECT_TRUE(editor.contains(id));
+    EXPECT_NEAR(scene.groups[0].area, area, 1e-12 * area);
+    EXPECT_THROW(editor.restore(id, what, where), Error);
+    checkOctree(scene, scene.groups[0]);
+}
+
+TEST(SceneEditor, whatCannotBeChangesNothing) {
+    Scene scene = makeScene(50, 3);
+    SceneEditor editor(scene);
+    const double area = scene.groups[0].area;
+    const Affine flat{DMat3(1, 0, 0, 0, 0, 0, 0, 0, 1), DVec3(0)};
+    const Affine nowhere{DMat3(1.0), DVec3(std::nan(""))};
+    EXPECT_THROW(editor.insert(0, ChildRef::mesh(0), flat), Error);
+    EXPECT_THROW(editor.insert(0, ChildRef::mesh(0), nowhere), Error);
+    EXPECT_THROW(editor.insert(0, ChildRef::mesh(9), Affine()), Error);
+    EXPECT_THROW(editor.insert(9, ChildRef::mesh(0), Affine()), Error);
+    EXPECT_THROW(editor.insert(1, ChildRef::group(0), Affine()), Error) << "a cycle";
+    EXPECT_THROW(editor.insert(0, ChildRef::group(0), Affine()), Error) << "a cycle";
+    EXPECT_THROW(editor.move({0, 3}, flat), Error);
+    EXPECT_THROW(editor.find({}), Error);
+    EXPECT_THROW(editor.find({3, 0}), Error) << "a mesh has nothing below";
+    EXPECT_THROW(editor.findOwn({50, 999}), Error);
+    EXPECT_EQ(scene.groups.size(), 2u);
+    EXPECT_EQ(scene.groups[0].area, area);
+    EXPECT_FALSE(editor.takeChanges().any);
+}
+
+TEST(SceneEditor, aGroupChangesEverywhereOrInOnePlace) {
+    for (const size_t tiles : {size_t(3), size_t(40)}) {  // few places, and many
+        Scene scene = makeScene(50, tiles);
+        SceneEditor editor(scene);
+        const double instances = scene.groups[0].instances_total;
+        editor.remove(editor.find({50, 7}));
+        EXPECT_EQ(scene.groups[0].instances_total, instances - double(tiles));
+        const uint32_t mine = editor.findOwn({51, 9}).group;
+        EXPECT_EQ(mine, 2u);
+        EXPECT_EQ(editor.findOwn({51, 9}).group, mine) << "it is its own already";
+        editor.remove(editor.find({51, 9}));
+        EXPECT_EQ(scene.groups[0].instances_total, instances - double(tiles) - 1.0);
+        EXPECT_TRUE(editor.contains({1, 9}));
+        EXPECT_FALSE(editor.contains({mine, 9}));
+        // Much larger: it reaches beyond where it was.
+        editor.insert(1, ChildRef::mesh(0), {DMat3(60.0), DVec3(0, 100, 0)});
+        for (const Group& group : scene.groups) checkOctree(scene, group);
+        const Scene fresh = builtAnew(scene);
+        EXPECT_NEAR(scene.groups[0].area, fresh.groups[0].area, 1e-9 * scene.groups[0].area);
+        EXPECT_NEAR(scene.groups[0].bounds.max.y, fresh.groups[0].bounds.max.y, 1e-3);
+    }
+}
+
+TEST(SceneEditor, manyAtOnceAreAsOneByOne) {
+    for (const size_t n : {size_t(20), size_t(5000)}) {
+        Scene scene = makeScene(1000, 2);
+        SceneEditor editor(scene);
+        editor.remove({0, 5});
+        std::vector<SceneEditor::NewInstance> more;
+        Rng rng{5};
+        for (size_t i = 0; i < n; ++i) more.push_back({ChildRef::mesh(0), randomPlace(rng, 700.0)});
+        ThreadPool pool(2);
+        const InstanceId first = editor.insertMany(0, more, pool);
+        EXPECT_EQ(first.index, 1002u);
+        EXPECT_EQ(checkOctree(scene, scene.groups[0]), 1001 + n);
+        EXPECT_FALSE(editor.contains({0, 5}));
+        for (size_t i = 0; i < n; i += 7) {
+            const Affine at = editor.groupFromChild({0, first.index + uint32_t(i)});
+            EXPECT_NEAR(glm::length(at.translation - more[i].group_from_child.translation), 0.0,
+                        1e-5);
+        }
+        EXPECT_EQ(scene.groups[0].instances_total, double(999 + n + 2 * 60));
+    }
+}
+
+// Instances are drawn in proportion to their areas, as they now are.
+TEST(SceneEditor, pointsFallOnInstancesByTheirAreas) {
+    Scene scene = makeScene(300, 0);
+    SceneEditor editor(scene);
+    Rng rng{11};
+    std::vector<InstanceId> alive = idsOf(scene, 0);
+    editAtRandom(editor, alive, 0, 30000, 500.0, rng);
+    const Group& group = scene.groups[0];
+    std::map<uint32_t, double> hits;
+    constexpr int kDraws = 400000;
+    for (int i = 0; i < kDraws; ++i)
+        ++hits[instanceAt(scene, group, 0, rng.uniform(0.0, 1.0)).instance];
+    double chi_square = 0.0, categories = 0.0;
+    for (uint32_t i = 0; i < group.instances.size(); ++i) {
+        if (group.instances.child(i).isNone()) continue;
+        const double expected = kDraws * childArea(scene, group.instances.child(i)) *
+                                group.instances.areaScale(i) / group.area;
+        if (expected < 10.0) continue;
+        const double d = hits[i] - expected;
+        chi_square += d * d / expected;
+        ++categories;
+    }
+    ASSERT_GT(categories, 50.0);
+    EXPECT_LT(chi_square, categories + 4.0 * std::sqrt(2.0 * categories));
+}
+
+// Lists of what did not change are kept; all hold what they would if they were made now.
+TEST(SceneEditor, cachedPointsFollow) {
+    Scene scene = makeScene(50, 20);
+    SceneEditor editor(scene);
+    PointLists lists(scene);
+    ASSERT_TRUE(lists.hasLists(ChildRef::group(1)));
+    const ListIdentity identity;
+    Rng rng{13};
+    std::vector<InstanceId> alive = idsOf(scene, 1);
+    for (int round = 0; round < 20; ++round) {
+        lists.startFrame(identity, size_t(64) << 20);
+        PointLists fresh(scene);
+        fresh.startFrame(identity, 0);
+        size_t compared = 0;
+        for (uint32_t node = 0; node < scene.groups[1].nodes.size(); ++node) {
+            if (!(scene.groups[1].nodes[node].area > 0.0)) continue;
+            const ListName name{ChildRef::group(1), node};
+            ListBlock scratch_a, scratch_b;
+            int lane_a = 0, lane_b = 0;
+            const ListBlock& a = lists.points(name, 64, 64, 128, scratch_a, lane_a);
+            const ListBlock& b = fresh.points(name, 64, 64, 128, scratch_b, lane_b);
+            ASSERT_EQ(std::memcmp(a.position, b.position, sizeof a.position), 0) << node;
+            ASSERT_EQ(std::memcmp(a.instance, b.instance, sizeof a.instance), 0) << node;
+            ++compared;
+        }
+        EXPECT_GT(compared, 0u);
+        const size_t before = lists.bytes();
+        editAtRandom(editor, alive, 1, round % 3 == 0 ? 1 : 50, 20.0, rng);
+        lists.sceneChanged(editor.takeChanges());
+        EXPECT_LT(lists.bytes(), before);
+        if (round % 3 == 0 && scene.groups[1].nodes.size() > 8) {
+            EXPECT_GT(lists.bytes(), 0u) << "the others are kept";
+        }
+    }
+}
+
+}  // namespace
+}  // namespace stipple
