@@ -42,6 +42,10 @@ struct Group {
     // was inserted. Never given twice. Empty before building: the place.
     std::vector<uint32_t> listed_index;
     uint32_t next_index = 0;  // what will be given next
+    // Where edits have changed what the scene file's rules make: by listed_index; empty: nowhere.
+    std::vector<bool> edited;
+    uint32_t ruled_count = 0;  // instances that the rules make
+    std::string copy_of;       // the group whose rules made it, if those are not its own
 
     // What buildScene() adds.
     std::vector<GroupNode> nodes;

@@ -26,6 +26,7 @@ struct Scene {
     uint32_t root = 0;  // index into groups
     std::vector<Camera> cameras;
     std::vector<CameraPath> paths;
+    std::map<std::string, ChildRef> names;  // what the scene file calls its assets and groups
     Lighting lighting;
     std::map<std::string, std::string>
         render_defaults;  // the scene file's "render": settings by name

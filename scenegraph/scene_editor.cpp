@@ -21,6 +21,14 @@ uint32_t placesOf(const GroupNode& node) { return node.resident_count + node.fre
 
 uint32_t capacityFor(uint32_t count) { return std::bit_ceil(std::max(count, 4u)); }
 
+// For a copy: "tile~2".
+std::string freeName(const Scene& scene, const std::string& name) {
+    for (int i = 2;; ++i) {
+        std::string result = name + "~" + std::to_string(i);
+        if (!scene.names.contains(result)) return result;
+    }
+}
+
 [[noreturn]] void refuse(const std::string& what) {
     throw Error(ErrorCode::kInvalidArgument, "", what);
 }
@@ -191,9 +199,11 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     }
     const double instances_before = group.instances_total, triangles_before = group.triangles_total;
     for (const NewInstance& i : instances) {
-        addUse({group_index, group.next_index}, i.child);
+        const InstanceId id{group_index, group.next_index};
+        addUse(id, i.child);
         group.instances.add(i.child, i.group_from_child);
         group.listed_index.push_back(group.next_index++);
+        markEdited(id);
     }
     const ChildSums as_child = group.as_child;
     buildGroup(scene_, group, scene_.path + ": /groups/" + group.name, pool);
@@ -244,6 +254,9 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             uses_.emplace_back();
             Group& group = scene_.groups[copy];
             group.as_child = {group.bounds, group.area, group.max_triangle_area};
+            if (group.copy_of.empty()) group.copy_of = group.name;
+            group.name = freeName(scene_, group.copy_of);
+            scene_.names[group.name] = ChildRef::group(copy);
             for (uint32_t k = 0; k < group.instances.size(); ++k) {
                 const ChildRef inner = group.instances.child(k);
                 if (!inner.isNone()) addUse({copy, group.listed_index[k]}, inner);
@@ -252,6 +265,7 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             removeUse(id, below);
             below = ChildRef::group(copy);
             scene_.groups[id.group].instances.setChild(slot, below);
+            markEdited(id);
             addUse(id, below);
             changes_.assets = changes_.any = true;
             refreshUpwards(id.group, open_[id.group]->node_of[slot]);
@@ -260,8 +274,15 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
     }
 }
 
+void SceneEditor::markEdited(InstanceId id) {
+    std::vector<bool>& edited = scene_.groups[id.group].edited;
+    if (edited.size() <= id.index) edited.resize(scene_.groups[id.group].next_index, false);
+    edited[id.index] = true;
+}
+
 void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_child) {
     addUse(id, child);
+    markEdited(id);
     DVec3 center, half;
     instanceBox(childSums(scene_, child), group_from_child, center, half);
     const uint32_t node = chooseNode(scene_.groups[id.group], center, half);
@@ -286,6 +307,7 @@ void SceneEditor::take(InstanceId id) {
     const uint32_t slot = open.slot_of[id.index], node_index = open.node_of[slot];
     const ChildRef child = group.instances.child(slot);
     removeUse(id, child);
+    markEdited(id);
     const bool is_group = child.isGroup();
     countInstances(id.group, is_group ? -scene_.groups[child.index()].instances_total : -1.0,
                    is_group ? -scene_.groups[child.index()].triangles_total

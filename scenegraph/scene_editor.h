@@ -117,6 +117,7 @@ private:
     void refreshAll(uint32_t group);
     void countInstances(uint32_t group, double instances, double triangles);
     void note(uint32_t group, uint32_t node);
+    void markEdited(InstanceId id);
 
     Scene& scene_;
     std::vector<std::unique_ptr<OpenGroup>> open_;     // by group

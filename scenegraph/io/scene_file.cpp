@@ -167,6 +167,8 @@ private:
         static const JsonSchema schema(kSceneSchemaText);
         if (const auto problem = schema.firstProblem(document.root))
             reader_.fail(problem->path, problem->message);
+        if (!open_.empty() && document.root.contains("edits"))
+            reader_.fail({"edits"}, "only the scene file itself has edits, not what it includes");
         if (const auto list = document.root.find("include"); list != document.root.end()) {
             open_.push_back(path);
             for (size_t i = 0; i < list->size(); ++i) {
@@ -282,6 +284,8 @@ Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
     const SceneDocument& main = documents.back();
     reader.name = main.name, reader.folder = main.folder;
     const Json& root = main.root;
+    if (root.contains("edits")) readEdits(reader, root["edits"]);
+    reader.scene.names = reader.children;
     if (!root.contains("root")) reader.fail({}, "Missing required property 'root'");
     const std::string& root_name = root["root"].get_ref<const std::string&>();
     const ChildRef root_child = reader.child(root_name, {"root"});

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <scenegraph/io/instance_buffer.h>
+#include <scenegraph/io/instance_json.h>
 #include <scenegraph/io/number_picture.h>
 #include <scenegraph/io/scene_reader.h>
 #include <scenegraph/io/schemas.h>
-#include <scenegraph/io/transform.h>
 
 #include <deque>
 #include <functional>
@@ -14,80 +14,6 @@ namespace stipple {
 
 namespace {
 
-constexpr double kMaxLength = 1e9, kMaxFactor = 1e6;  // as in the schema
-
-struct Instance {
-    const std::string* child = nullptr;
-    DVec3 translation = DVec3(0), angles = DVec3(0), scale = DVec3(1);
-    double quaternion[4] = {0, 0, 0, 1};
-    double matrix[16];
-    bool has_parts = false, has_angles = false, has_quaternion = false, has_matrix = false;
-};
-
-bool readNumbers(const Json& value, size_t n, double limit, double* result) {
-    if (!value.is_array() || value.size() != n) return false;
-    for (size_t i = 0; i < n; ++i) {
-        if (!value[i].is_number()) return false;
-        result[i] = value[i].get<double>();
-        if (std::abs(result[i]) > limit) return false;
-    }
-    return true;
-}
-
-// False for anything that is not exactly as the schema's "instance" has it, which then says why.
-bool readInstance(const Json& source, Instance& result) {
-    if (!source.is_object()) return false;
-    for (auto it = source.begin(); it != source.end(); ++it) {
-        const std::string& key = it.key();
-        const Json& value = it.value();
-        if (key == "child") {
-            if (!value.is_string()) return false;
-            result.child = &value.get_ref<const std::string&>();
-        } else if (key == "translation") {
-            if (!readNumbers(value, 3, kMaxLength, &result.translation.x)) return false;
-            result.has_parts = true;
-        } else if (key == "rotation") {
-            if (!readNumbers(value, 3, kMaxFactor, &result.angles.x)) return false;
-            result.has_parts = result.has_angles = true;
-        } else if (key == "quaternion") {
-            if (!readNumbers(value, 4, kMaxFactor, result.quaternion)) return false;
-            result.has_parts = result.has_quaternion = true;
-        } else if (key == "scale") {
-            if (value.is_number()) {
-                result.scale = DVec3(value.get<double>());
-                if (std::abs(result.scale.x) > kMaxFactor) return false;
-            } else if (!readNumbers(value, 3, kMaxFactor, &result.scale.x)) {
-                return false;
-            }
-            result.has_parts = true;
-        } else if (key == "matrix") {
-            if (!readNumbers(value, 16, kMaxLength, result.matrix)) return false;
-            result.has_matrix = true;
-        } else {
-            return false;
-        }
-    }
-    return result.child != nullptr;
-}
-
-// nullptr, or what is wrong.
-const char* makeTransform(const Instance& instance, Affine& result) {
-    if (instance.has_matrix) {
-        if (instance.has_parts) return "has a matrix and other transforms too";
-        if (!affineFromMatrix(instance.matrix, result))
-            return "the matrix' last row is not 0 0 0 1";
-    } else {
-        if (instance.has_angles && instance.has_quaternion)
-            return "has both rotation and quaternion";
-        DMat3 rotation(1.0);
-        if (instance.has_quaternion && !rotationFromQuaternion(instance.quaternion, rotation))
-            return "the quaternion is zero";
-        if (instance.has_angles) rotation = rotationFromEuler(instance.angles * (kPi / 180.0));
-        result = affineFromParts(instance.translation, rotation, instance.scale);
-    }
-    return isSingular(result.linear) ? "singular transform: it flattens what it places" : nullptr;
-}
-
 // The box of the translations, as far as they can be read; what is wrong is found by
 // addInstances().
 DBox3 instancesDomain(const Json& instances) {
@@ -97,9 +23,9 @@ DBox3 instancesDomain(const Json& instances) {
         double matrix[16];
         if (source.is_object()) {
             if (const auto it = source.find("translation"); it != source.end())
-                readNumbers(*it, 3, kMaxLength, &p.x);
+                readNumbers(*it, 3, kMaxInstanceLength, &p.x);
             if (const auto it = source.find("matrix");
-                it != source.end() && readNumbers(*it, 16, kMaxLength, matrix)) {
+                it != source.end() && readNumbers(*it, 16, kMaxInstanceLength, matrix)) {
                 p = DVec3(matrix[12], matrix[13], matrix[14]);
             }
         }
@@ -113,7 +39,7 @@ void addInstances(SceneReader& reader, const Json& instances, InstanceStore& sto
     size_t i = 0;
     for (const Json& source : instances) {
         if (i % 65536 == 0) reader.context.throwIfCancelled();
-        Instance instance;
+        JsonInstance instance;
         const auto path = [&] { return joined(group_path, {"instances", std::to_string(i)}); };
         if (!readInstance(source, instance)) {
             static const JsonSchema schema(kSceneSchemaText, "instance");
@@ -327,6 +253,7 @@ void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Jso
         reader.context.throwIfCancelled();
     }
     if (grid) withPlace(reader, grid_path, [&] { placeGrid(*grid, reader.pool, store); });
+    reader.scene.groups[index].ruled_count = uint32_t(store.size());
     reader.scene.groups[index].instances = std::move(store);
 }
 

@@ -43,6 +43,9 @@ void readAssets(SceneReader& reader, const Json& assets);
 // group's explicit ones, which have been taken out of `group` and are not yet validated.
 void readGroup(SceneReader& reader, uint32_t index, const Json& group, const Json& instances);
 
+// Changes what the rules of groups have made, and copies groups (scene_edits.cpp).
+void readEdits(SceneReader& reader, const Json& edits);
+
 // Fills the scene's lighting from the document's lights, background and exposure.
 void readLighting(SceneReader& reader, const Json& root);
 

@@ -36,6 +36,7 @@ const std::vector<Command>& commandTable() {
         {"info", "say what is in a scene", runInfo},
         {"compare", "measure how much two pictures differ", runCompare},
         {"bench", "measure points beside rays and the z-buffer", runBench},
+        {"edit", "change a scene line by line, and look at it", runEditScene},
         {"generate", "make trees, rocks, terrains, forests and landscapes", runGenerate},
         {"help", "explain a command, or list the settings", runHelp},
     };

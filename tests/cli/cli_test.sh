@@ -506,6 +506,146 @@ JSON
     expect_stdout '^    raycast +16 rays'
 }
 
+# A plane of balls, 5 x 5, and a group that is shown twice.
+write_edit_scene() {
+    cat >edit.scene.json <<JSON
+{
+  "version": 1,
+  "assets": {
+    "ball": { "generate": "sphere", "triangles": 500 },
+    "box": { "generate": "box" }
+  },
+  "groups": {
+    "balls": { "grid": { "child": "ball", "count_x": 5, "count_z": 5, "spacing_x": 3, "spacing_z": 3 } },
+    "all": { "instances": [
+      { "child": "balls" },
+      { "child": "balls", "translation": [0, 0, -20] },
+      { "child": "box", "translation": [0, 4, 0] }
+    ] }
+  },
+  "cameras": [ { "name": "front", "eye": [0, 12, 30], "target": [0, 0, -5] },
+               { "name": "top", "eye": [0, 40, 1], "target": [0, 0, 0] } ],
+  "root": "all"
+}
+JSON
+}
+small=(--width 160 --height 120)
+
+case_edit() {
+    write_edit_scene
+    cat >edits.jsonl <<JSON
+{"do": "render"}
+
+{"do": "insert", "child": "box", "group": "balls", "translation": [1, 2, 1], "as": "mine"}
+{"do": "render"}
+{"do": "remove", "object": "mine"}
+{"do": "render"}
+{"do": "remove", "object": "1/12", "only_here": true}
+{"do": "move", "group": "balls", "index": 3, "translation": [0, 5, 0]}
+{"do": "replace", "object": "2", "child": "ball"}
+{"do": "camera", "name": "top"}
+{"do": "render", "output": "top.png"}
+JSON
+    expect_ok edit edit.scene.json --script edits.jsonl -o f_%d.png "${small[@]}" --stats stats.json --quiet
+    expect_stdout '^{"group":"balls","index":25}$'
+    expect_stdout '^f_2\.png$'
+    expect_stdout '^top\.png$'
+    cmp -s f_0.png f_2.png || fail "insert and remove are not the same as nothing"
+    cmp -s f_0.png f_1.png && fail "the inserted box is not seen"
+    grep -q '"median_seconds"' stats.json || fail "no times"
+    # Standard input, one line at a time.
+    echo '{"do": "remove", "object": "2"}' | "$stipple" edit edit.scene.json --script - --quiet ||
+        fail "standard input"
+}
+
+case_edit_errors() {
+    write_edit_scene
+    cat >edits.jsonl <<JSON
+{"do": "insert", "child": "bal"}
+{"do": "insert", "child": "ball", "scale": 0}
+{"do": "insert", "child": "ball", "translation": [1, 2]}
+not json
+{"do": "remove", "object": "7"}
+{"do": "remove", "object": "0/12/3"}
+{"do": "insert", "child": "all", "group": "balls"}
+{"do": "remove", "objct": "2"}
+{"do": "fly"}
+{"do": "render"}
+{"do": "save", "output": "/tmp/edit.scene.json"}
+[1]
+{"do": "render", "output": "a.png"}
+JSON
+    expect_ok render edit.scene.json -o b.png "${small[@]}" --quiet
+    "$stipple" edit edit.scene.json --script edits.jsonl "${small[@]}" --quiet >stdout.txt 2>stderr.txt
+    [[ $? == 3 ]] || fail "exit code"
+    [[ $(wc -l <stderr.txt) == 12 ]] || fail "not a line for each error"
+    for line in "line 1: /child: .*did you mean \"ball\"" "line 2: singular" "line 3: /translation: " "line 4: " \
+        "line 5: there is no instance 7" "line 6: " "line 7: group \"all\" contains \"balls\"" \
+        "line 8: /objct: .*did you mean \"object\"" "line 9: /do: " "line 10: needs \"output\"" "line 11: .*folder" \
+        "line 12: "; do
+        grep -qE "edits.jsonl: $line" stderr.txt || fail "no such error: $line"
+    done
+    cmp -s a.png b.png || fail "bad lines have changed something"
+    expect_error 3 'missing\.jsonl' edit edit.scene.json --script missing.jsonl
+}
+
+# A saved scene looks the same, keeps its rules, and its instances keep their names.
+case_edit_save() {
+    write_edit_scene
+    cat >edits.jsonl <<JSON
+{"do": "insert", "child": "box", "group": "balls", "translation": [1, 2, 1]}
+{"do": "insert", "child": "ball", "translation": [3, 2, 1], "scale": [1, 2, 1]}
+{"do": "insert", "child": "ball", "group": "balls", "translation": [3, 5, 1]}
+{"do": "remove", "group": "balls", "index": 26}
+{"do": "remove", "object": "1/12", "only_here": true}
+{"do": "move", "group": "balls", "index": 3, "translation": [0, 5, 0]}
+{"do": "render", "output": "a.png"}
+{"do": "save", "output": "saved.scene.json"}
+JSON
+    expect_ok edit edit.scene.json --script edits.jsonl "${small[@]}" --quiet
+    grep -q '"grid"' saved.scene.json || fail "the rule is gone"
+    grep -q '"copy_of": "balls"' saved.scene.json || fail "no copy"
+    expect_ok render saved.scene.json -o b.png "${small[@]}" --quiet
+    expect_ok compare a.png b.png --fail-below 45
+    # Once more, from there: nothing changes but what is told; names go on.
+    cat >more.jsonl <<JSON
+{"do": "insert", "child": "box", "group": "balls", "translation": [0, 9, 0]}
+{"do": "remove", "group": "balls", "index": 27}
+{"do": "remove", "group": "balls", "index": 26}
+{"do": "save", "output": "again.scene.json"}
+JSON
+    "$stipple" edit saved.scene.json --script more.jsonl --quiet >stdout.txt 2>stderr.txt
+    [[ $? == 3 ]] || fail "a removed name was known"
+    expect_stdout '"index":27'
+    expect_ok render again.scene.json -o c.png "${small[@]}" --quiet
+    expect_ok compare b.png c.png --fail-below 45
+}
+
+case_edit_file_errors() {
+    write_edit_scene
+    with_edits() { sed "s|\"root\": \"all\"|\"root\": \"all\", \"edits\": $1|" edit.scene.json >bad.scene.json; }
+    with_edits '{ "ballss": { "removed": [1] } }'
+    expect_error 3 '/edits/ballss: .*did you mean "balls"' info bad.scene.json
+    with_edits '{ "balls": { "removed": [25] } }'
+    expect_error 3 '/edits/balls/removed/0: ' info bad.scene.json
+    with_edits '{ "balls": { "removed": [2, 2] } }'
+    expect_error 3 '/edits/balls/removed/1: ' info bad.scene.json
+    with_edits '{ "balls": { "removed": [-2] } }'
+    expect_error 3 '/edits/balls/removed/0' info bad.scene.json
+    with_edits '{ "balls": { "placed": [ { "index": 1, "child": "bll" } ] } }'
+    expect_error 3 '/edits/balls/placed/0/child: ' info bad.scene.json
+    with_edits '{ "balls": { "placed": [ { "index": 1, "child": "ball", "scale": 0 } ] } }'
+    expect_error 3 '/edits/balls/placed/0: ' info bad.scene.json
+    with_edits '{ "balls": { "placed": [ { "index": 99999999999, "child": "ball" } ] } }'
+    expect_error 3 '/edits/balls/placed/0/index: ' info bad.scene.json
+    with_edits '{ "two": { "copy_of": "ball" } }'
+    expect_error 3 '/edits/two/copy_of: ' info bad.scene.json
+    with_edits '{ "ball": { "removed": [0] } }'
+    expect_error 3 '/edits/ball: ' info bad.scene.json
+    with_edits '{ "balls": { "placed": [ { "index": 4, "child": "all" } ] } }'
+    expect_error 3 'contains itself' info bad.scene.json
+}
+
 case_bench_usage() {
     write_scene
     expect_error 2 "did you mean 'zbuffer'" bench scene.scene.json --against zbufer
