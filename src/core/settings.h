@@ -16,6 +16,7 @@ enum class Method { kPoints, kZBuffer, kRaycast };
 enum class Reconstruct { kPerPixel, kSplat, kGaussian, kPullPush, kEwa };
 enum class PullPushCoverage { kBilinear, kSquares };
 enum class Sampler { kStratified, kRandom };
+enum class Tone { kNone, kFilmic, kAces, kAgx };
 
 struct RenderSettings {
     int width = 1280;  // pixels
@@ -35,6 +36,8 @@ struct RenderSettings {
     bool shadows = false;
     double shadow_texel = 1.0;  // side of a shadow map's texel where it is seen, pixels
     bool ao = false;
+    double exposure = 0.0;    // stops, beside the scene's
+    Tone tone = Tone::kNone;  // of pictures that are shown (PNG)
     uint64_t seed = 1;
     int threads = 0;              // 0: one a core
     int cache_mb = 256;           // point lists kept between frames; 0: off

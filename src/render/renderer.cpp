@@ -145,7 +145,9 @@ Frame Renderer::render(const FrameRequest& asked) {
     const View view = makeView(request.camera, request.settings.width, request.settings.height,
                                request.settings.subpixels);
     const Stopwatch watch;
-    Picture picture(view, impl_->scene.lighting, request.aovs, request.transparent);
+    Lighting lighting = impl_->scene.lighting;
+    lighting.exposure += float(request.settings.exposure);
+    Picture picture(view, lighting, request.aovs, request.transparent);
     int debug_x = 0, debug_y = 0;
     const bool is_debugging =
         std::sscanf(request.debug_pixel.c_str(), "%d,%d", &debug_x, &debug_y) == 2 &&

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <render/compare.h>
+#include <render/edit_times.h>
 #include <render/renderer.h>
 #include <tools/bench_limit.h>
 
@@ -83,6 +84,7 @@ struct BenchResult {
     size_t limit_buffer_bytes = 0;
     std::vector<std::string> left_out;  // a line for each method that is not measured
     std::vector<CameraBench> cameras;
+    EditTimes edits;
 };
 
 double median(std::vector<double> values);
@@ -97,6 +99,7 @@ CameraBench benchCamera(const Scene& scene, const Camera& camera, const RenderSe
 // The table, piece by piece.
 std::string benchHeading(const BenchResult& result);
 std::string cameraTable(const CameraBench& camera, const BenchResult& result);
+std::string editTable(const EditTimes& edits);
 // Schema in docs/cli.md.
 std::string benchJson(const BenchResult& result);
 

@@ -229,6 +229,48 @@ std::string cameraTable(const CameraBench& camera, const BenchResult& result) {
     return text;
 }
 
+std::string editTable(const EditTimes& edits) {
+    std::string text;
+    append(text, "\nedits, one thread\n");
+    const auto line = [&](const char* name, const EditQuantiles& q) {
+        append(text, "    %-8s %8.2f us, 99 %% below %8.2f us\n", name, q.median * 1e6,
+               q.p99 * 1e6);
+    };
+    line("insert", edits.insert);
+    line("move", edits.move);
+    line("remove", edits.remove);
+    append(text, "    at once  %8.2f million inserts a second\n",
+           edits.bulk_inserts_per_second * 1e-6);
+    if (edits.embree.commit > 0.0) {
+        append(
+            text,
+            "    Embree's commit after a move: %.3f ms, %.0f times as long; dynamic, low quality: "
+            "%.3f ms, %.0f times\n",
+            edits.embree.commit * 1e3, edits.embree.commit / edits.move.median,
+            edits.embree.dynamic * 1e3, edits.embree.dynamic / edits.move.median);
+    }
+    return text;
+}
+
+namespace {
+
+Json editsJson(const EditTimes& edits) {
+    const auto quantiles = [](const EditQuantiles& q) {
+        return Json{{"median_seconds", q.median}, {"p99_seconds", q.p99}};
+    };
+    Json json = {{"insert", quantiles(edits.insert)},
+                 {"move", quantiles(edits.move)},
+                 {"remove", quantiles(edits.remove)},
+                 {"bulk_inserts_per_second", edits.bulk_inserts_per_second}};
+    if (edits.embree.commit > 0.0) {
+        json["embree_commit_seconds"] = edits.embree.commit;
+        json["embree_dynamic_commit_seconds"] = edits.embree.dynamic;
+    }
+    return json;
+}
+
+}  // namespace
+
 std::string benchJson(const BenchResult& result) {
     Json json = {{"schema", kSchema},
                  {"version", STIPPLE_VERSION},
@@ -248,6 +290,7 @@ std::string benchJson(const BenchResult& result) {
     json["cameras"] = Json::array();
     for (const CameraBench& camera : result.cameras)
         json["cameras"].push_back(cameraJson(camera, result));
+    json["edits"] = editsJson(result.edits);
     // Names from files may not be UTF-8; replace what is not.
     return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

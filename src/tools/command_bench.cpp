@@ -108,6 +108,8 @@ void checkCommandLine(CommandLine& line) {
     makeView(Camera(), line.width, line.height, 1);  // throws for absurd sizes
 }
 
+constexpr int kEdits = 20000;
+
 std::vector<const Camera*> chooseCameras(const Scene& scene,
                                          const std::vector<std::string>& names) {
     std::vector<const Camera*> cameras;
@@ -183,6 +185,10 @@ ExitCode runBench(const std::vector<std::string>& arguments) {
         if (result.cameras.size() == 1) std::cout << benchHeading(result);
         std::cout << cameraTable(result.cameras.back(), result) << std::flush;
     }
+    progress.update("edits", 0.0);
+    result.edits = measureEdits(scene, kEdits, line.bench.against_raycast, pool);
+    progress.finish();
+    std::cout << editTable(result.edits);
     if (!line.json.empty()) saveFile(line.json, benchJson(result));
     return ExitCode::kDone;
 }

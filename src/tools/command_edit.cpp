@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `stipple edit`: a scene that is changed line by line, looked at and saved.
 #include <core/stopwatch.h>
+#include <core/tone.h>
 #include <render/live_scene.h>
 #include <scenegraph/io/json.h>
 #include <scenegraph/io/load.h>
@@ -139,8 +140,9 @@ private:
                         "needs \"output\", or -o on the command line");
         if (output.empty()) output = frameName("-o", options_.output, next_frame_++);
         checkOutputFile("/output", output, {".png", ".exr"});
-        const Frame frame = live_.render(request_);
+        Frame frame = live_.render(request_);
         frames_.push_back(frame.stats.seconds);
+        if (lowerExtension(output) == ".png") applyTone(request_.settings.tone, frame.image);
         saveImage(frame.image, output, {});
         std::cout << output << std::endl;
     }

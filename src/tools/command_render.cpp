@@ -2,6 +2,7 @@
 // `stipple render`: check the command line, load, draw, write.
 #include <core/nearest_name.h>
 #include <core/stopwatch.h>
+#include <core/tone.h>
 #include <render/renderer.h>
 #include <scenegraph/io/load.h>
 #include <tools/choose_camera.h>
@@ -278,6 +279,7 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
             std::fprintf(stderr, "%s\n", frame.stats.debug_text.c_str());
         request.progress("write", 0.0);
         const Stopwatch write_watch;
+        if (lowerExtension(outputs[done]) == ".png") applyTone(request.settings.tone, frame.image);
         saveImage(frame.image, outputs[done], imageMetadata(stats, outputs[done]));
         stats.write_seconds += write_watch.seconds();
         if (is_series)

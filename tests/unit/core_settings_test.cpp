@@ -45,6 +45,7 @@ TEST(CoreSettings, entriesChangeOneValueEach) {
         if (info.key == "sampler") other = "random";
         if (info.key == "reconstruct") other = "gaussian";
         if (info.key == "pull_push_coverage") other = "squares";
+        if (info.key == "tone") other = "agx";
         if (info.key == "tile_size") other = "128";
         RenderSettings settings;
         applySetting(settings, info.key, other, "");
