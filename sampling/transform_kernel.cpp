@@ -49,36 +49,29 @@ inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
     for (int i = 0; i < n; ++i) {
         const float dx = bx + sx * float(px[i]), dy = by + sy * float(py[i]),
                     dz = bz + sz * float(pz[i]);
-        if constexpr (!kThin) {
-            const float x = m00 * dx + m01 * dy + m02 * dz;
-            const float y = m10 * dx + m11 * dy + m12 * dz;
-            const float z = m20 * dx + m21 * dy + m22 * dz;
-            out_x[i] = x;
-            out_y[i] = y;
-            out_z[i] = z;
-            number[i] = first_number + uint32_t(i);
-            keep[i] = uint8_t((widths[i] != 0) & (z > z_near) & (z <= z_far));
-            continue;
-        }
-        const float nx = float(qx[i]), ny = float(qy[i]), nz = float(qz[i]);
         const float x = m00 * dx + m01 * dy + m02 * dz;
         const float y = m10 * dx + m11 * dy + m12 * dz;
         const float z = m20 * dx + m21 * dy + m22 * dz;
-        // Minus the cosine to the way of the eye: positive when facing it.
-        const float facing =
-            kOrthographic ? -(nx * fx + ny * fy + nz * fz) : -(nx * dx + ny * dy + nz * dz);
-        const float seen = single_sided[i] ? facing : std::abs(facing);
-        const float scaled = gain * seen;
-        const float probability = kOrthographic ? scaled : scaled / (z * z * z);
-        const uint32_t index = first_index + uint32_t(i);
-        const uint32_t bits =
-            kRandom ? mixBits32(index * 0x9e3779b9u ^ hash) : index * 0x9e3779b9u + hash;
-        const float threshold = float(int(bits >> 8)) * 0x1p-24f;
         out_x[i] = x;
         out_y[i] = y;
         out_z[i] = z;
         number[i] = first_number + uint32_t(i);
-        keep[i] = uint8_t((probability > threshold) & (z > z_near) & (z <= z_far));
+        if constexpr (!kThin) {
+            keep[i] = uint8_t((widths[i] != kNoPatch) & (z > z_near) & (z <= z_far));
+        } else {
+            const float nx = float(qx[i]), ny = float(qy[i]), nz = float(qz[i]);
+            // Minus the cosine to the way of the eye: positive when facing it.
+            const float facing =
+                kOrthographic ? -(nx * fx + ny * fy + nz * fz) : -(nx * dx + ny * dy + nz * dz);
+            const float seen = single_sided[i] ? facing : std::abs(facing);
+            const float scaled = gain * seen;
+            const float probability = kOrthographic ? scaled : scaled / (z * z * z);
+            const uint32_t index = first_index + uint32_t(i);
+            const uint32_t bits =
+                kRandom ? mixBits32(index * 0x9e3779b9u ^ hash) : index * 0x9e3779b9u + hash;
+            const float threshold = float(int(bits >> 8)) * 0x1p-24f;
+            keep[i] = uint8_t((probability > threshold) & (z > z_near) & (z <= z_far));
+        }
     }
 }
 

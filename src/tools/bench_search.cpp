@@ -12,7 +12,7 @@ constexpr int kSubpixels[] = {1, 2, 3, 4, 5, 6, 8};
 constexpr double kSamples[] = {0.5, 1.0, 2.0, 4.0};
 // area_threshold and visible_size
 constexpr std::pair<double, double> kDetails[] = {
-    {1.0, 32.0}, {16.0, 32.0}, {4.0, 96.0}, {16.0, 96.0}};
+    {1.0, 32.0}, {16.0, 32.0}, {16.0, 0.0}, {16.0, 96.0}};
 constexpr double kGain = 0.1;  // dB: more points that bring less are not worth trying further
 
 }  // namespace

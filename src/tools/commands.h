@@ -16,6 +16,7 @@ ExitCode runInfo(const std::vector<std::string>& arguments);
 ExitCode runCompare(const std::vector<std::string>& arguments);
 ExitCode runBench(const std::vector<std::string>& arguments);
 ExitCode runEditScene(const std::vector<std::string>& arguments);
+ExitCode runView(const std::vector<std::string>& arguments);
 ExitCode runGenerate(const std::vector<std::string>& arguments);
 ExitCode runHelp(const std::vector<std::string>& arguments);
 

@@ -37,6 +37,7 @@ const std::vector<Command>& commandTable() {
         {"compare", "measure how much two pictures differ", runCompare},
         {"bench", "measure points beside rays and the z-buffer", runBench},
         {"edit", "change a scene line by line, and look at it", runEditScene},
+        {"view", "look around in a window, and edit", runView},
         {"generate", "make trees, rocks, terrains, forests and landscapes", runGenerate},
         {"help", "explain a command, or list the settings", runHelp},
     };

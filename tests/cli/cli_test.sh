@@ -78,7 +78,7 @@ case_help() {
 
 # docs/cli.md names every option of every command, and no option that does not exist.
 case_help_names_every_option() {
-    for command in render info compare bench edit generate; do "$stipple" help "$command"; done |
+    for command in render info compare bench edit view generate; do "$stipple" help "$command"; done |
         grep -oE -- '^  (-. )?--[a-z-]+' | grep -oE -- '--[a-z-]+' | sort -u >have.txt
     grep -oE -- '--[a-z][a-z-]*' "$repository/docs/cli.md" | sort -u >documented.txt
     [[ $(wc -l <have.txt) -gt 20 ]] || fail "cannot read the help"

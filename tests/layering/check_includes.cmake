@@ -21,7 +21,8 @@ set(libraries
   "^(tbb|oneapi)/"     "^src/core/parallel\\.cpp$"
   "^(tiny_gltf|tiny_obj_loader|draco/|meshoptimizer|nanoflann|Eigen/|valijson/)" "^scenegraph/io/"
   "^nlohmann/"         "^(scenegraph/io|src/tools)/"
-  "^CLI/"              "^src/tools/")
+  "^CLI/"              "^src/tools/"
+  "^(GLFW/|imgui|backends/)" "^src/tools/view_window\\.cpp$")
 
 function(check_file folder path)
   file(STRINGS ${SOURCE_DIR}/${path} lines REGEX "^[ \t]*#[ \t]*include")
