@@ -18,13 +18,13 @@ struct JsonInstance {
 };
 
 // False for anything but n numbers, none beyond the limit.
-    bool readNumbers(const Json& value, size_t n, double limit, double* result);
+bool readNumbers(const Json& value, size_t n, double limit, double* result);
 
-    // False for anything that is not exactly as the schema's "instance" has it, which then says
-    // why. The result points into the source.
-    bool readInstance(const Json& source, JsonInstance& result);
+// False for anything that is not exactly as the schema's "instance" has it, which then says
+// why. The result points into the source.
+bool readInstance(const Json& source, JsonInstance& result);
 
-    // nullptr, or what is wrong.
-    const char* makeTransform(const JsonInstance& instance, Affine& result);
+// nullptr, or what is wrong.
+const char* makeTransform(const JsonInstance& instance, Affine& result);
 
 }  // namespace stipple
