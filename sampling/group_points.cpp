@@ -26,6 +26,11 @@ void GroupPoints::draw(ChildRef ref, uint32_t node_index, const Affine& camera_f
     }
 }
 
+// Lists are shared by all instances of a group. So short a run may begin at any of eight places of
+// the longest list; longer ones of groups of groups, which may fill the picture many times, would
+// show the same points over and over.
+static constexpr uint32_t kDeepRun = kLongestList / 8;
+
 // Systematic sampling: the node's points lie at (k + phase) * spacing along the cumulated areas of
 // everything below it, in octree order. Passes a range on to whom it belongs, so only subtrees with
 // points are visited; what has a list long enough is drawn from it.
@@ -35,7 +40,7 @@ void GroupPoints::sweep(ChildRef ref, uint32_t node_index, const Affine& camera_
     const GroupNode& node = group.nodes[node_index];
     if (context_.lists.hasLists(ref)) {
         const uint64_t count = pointsBefore(base + node.area * scale) - pointsBefore(base);
-        if (count <= kLongestList) {
+        if (count <= (group.depth > 1 ? kDeepRun : kLongestList)) {
             drawList(camera_from_group, ref, node_index, path, scale, uint32_t(count));
             return;
         }
@@ -159,8 +164,12 @@ void GroupPoints::drawList(const Affine& camera_from_child, ChildRef child, uint
         addMeshPoints(context_, points_, frame, child.index(), node, seen, density, n);
         return;
     }
+    if (drawsWhatIsSeen(context_.settings)) {
+        n *= double(context_.lists.wholeFactor(child.index())
+                        .at(float(1.0 / std::sqrt(std::max(density.drawn, 1e-30)))));
+    }
     count = uint32_t(roundAtRandom(n, hashCombine(context_.settings.seed, path, node)));
-    points_.add(frame, {child, node}, density, points_.firstOf(path, count), count);
+    points_.add(frame, {child, node}, density, points_.firstOf(path, count, kLongestList), count);
 }
 
 }  // namespace stipple

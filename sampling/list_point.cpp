@@ -16,6 +16,10 @@ double listPosition(const PointKey& key) {
     return t - std::floor(t);
 }
 
+double positionResolution(Sampler sampler) {
+    return sampler == Sampler::kRandom ? 0x1p-50 : 0x1p-12;
+}
+
 template <class T>
 MeshPoint meshPointAt(const std::vector<T>& cumulative_area, const MeshNode& node, double position,
                       const PointKey& key) {
@@ -73,7 +77,8 @@ template MeshPoint meshPointAt(const std::vector<float>&, const MeshNode&, doubl
 InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node_index,
                          double position) {
     const GroupNode* node = &group.nodes[node_index];
-    double target = position * node->area;
+    const double total = node->area;
+    double target = position * total;
     for (bool is_found = false; !is_found;) {
         is_found = true;
         double residents = node->area;
@@ -96,7 +101,8 @@ InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node_i
         const ChildRef child = group.instances.child(i);
         const double area = childArea(scene, child) * group.instances.areaScale(i);
         if (target < area || i + 1 >= end)
-            return {i, area > 0.0 ? std::clamp(target / area, 0.0, 0x1.fffffep-1) : 0.0};
+            return {i, area > 0.0 ? std::clamp(target / area, 0.0, 0x1.fffffep-1) : 0.0,
+                    area / std::max(total, 1e-300)};
         target -= area;
     }
 }

@@ -20,6 +20,8 @@ struct PointKey {
 // Where point `index` lies along the cumulated areas, in [0, 1): van der Corput, scrambled and
 // shifted at random, or random.
 double listPosition(const PointKey& key);
+// Positions of a list's points are this far apart, or random in no more digits than this.
+double positionResolution(Sampler sampler);
 
 // Where on a mesh a point lies.
 struct MeshPoint {
@@ -38,6 +40,7 @@ MeshPoint meshPointAt(const std::vector<T>& cumulative_area, const MeshNode& nod
 struct InstancePoint {
     uint32_t instance = 0;
     double position = 0.0;  // along the areas of its child, in [0, 1)
+    double share = 1.0;     // of the node's area
 };
 
 // The instance at `position`, in [0, 1), along the areas (each the child's times the transform's

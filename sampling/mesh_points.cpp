@@ -7,11 +7,8 @@ namespace stipple {
 
 namespace {
 
-// So few triangles hide little of each other, and so few layers of surface.
-constexpr size_t kFewTriangles = 64;
+// So few layers of surface hide little of each other.
 constexpr float kFewLayers = 1.2f;
-// A mesh of more (a terrain) is seldom a plant, and measuring it takes time and memory.
-constexpr size_t kManyTriangles = 400000;
 // Directions are blurred by this much of their length, or instances would change all at once when
 // the eye crosses from one part of the sphere to the next.
 constexpr double kBlur = 0.15;
@@ -24,12 +21,14 @@ Vec3 blurred(const DVec3& d, const InstanceFrame& frame) {
 
 }  // namespace
 
+bool drawsWhatIsSeen(const RenderSettings& settings) {
+    return settings.visible_size > 0.0 && settings.sampler != Sampler::kRandom;
+}
+
 SeenMesh seeMesh(TileContext& context, const InstanceFrame& frame, uint32_t mesh_index,
                  const RunDensity& density) {
     const Mesh& mesh = context.scene.meshes[mesh_index];
-    if (!(context.settings.visible_size > 0.0) || context.settings.sampler == Sampler::kRandom ||
-        mesh.triangles.size() < kFewTriangles || mesh.triangles.size() > kManyTriangles)
-        return SeenMesh();
+    if (!drawsWhatIsSeen(context.settings) || !hidesItself(mesh)) return SeenMesh();
     const View& view = context.view;
     const DVec3 center(mesh.bounds.center());
     const DVec3 to_eye = view.orthographic ? -frame.facing : frame.eye_object - center;
@@ -63,7 +62,8 @@ void addMeshPoints(TileContext& context, PointWriter& points, const InstanceFram
     // Parts of a mesh are near and have many points; whole ones may have few.
     const bool may_be_few = node_index == 0 || context.settings.sampler == Sampler::kRandom;
     const uint32_t first =
-        may_be_few ? points.firstOf(hashCombine(frame.path, node_index, uint64_t(direction + 1)), n)
+        may_be_few ? points.firstOf(hashCombine(frame.path, node_index, uint64_t(direction + 1)), n,
+                                    uint32_t(context.settings.list_length))
                    : 0;
     points.add(frame, {ChildRef::mesh(mesh_index), node_index, direction}, density, first, n);
 }

@@ -18,6 +18,9 @@ struct SeenMesh {
     bool hasVisible() const { return direction != ListName::kWhole; }
 };
 
+// Whether meshes and groups are drawn by what can be seen of them, not by all of their surface.
+bool drawsWhatIsSeen(const RenderSettings& settings);
+
 // density: of the whole surface, were all of it drawn. The instance must be far enough to be seen
 // from one direction.
 SeenMesh seeMesh(TileContext& context, const InstanceFrame& frame, uint32_t mesh,

@@ -18,7 +18,7 @@ inline constexpr double kFewPoints = 16.0;
 inline constexpr uint32_t kCullTriangles = 4096;
 // A group's node with more points than this per subpixel is opened: most of it hides behind its own
 // front.
-inline constexpr double kMostOverdraw = 8.0;
+inline constexpr double kMostOverdraw = 24.0;
 // Unless its thinner side is no more subpixels than this: then its front cannot be told from the
 // rest, and this many points a subpixel stand for it.
 inline constexpr float kThinNode = 2.0f;

@@ -22,11 +22,16 @@ void pointAttributes(const Scene& scene, const View& view, const Run& run, const
     uint64_t path = run.path;
     const Group* group = run.child.isGroup() ? &scene.groups[run.child.index()] : nullptr;
     const uint32_t instance = list.instance[lane];
-    if (group) path = extendObjectPath(path, group->listed_index[instance]);
+    const bool is_prefiltered = group && group->depth > 1;
+    if (is_prefiltered) {
+        path = joinObjectPaths(path, instance, list.levels[lane]);
+    } else if (group) {
+        path = extendObjectPath(path, group->listed_index[instance]);
+    }
     sample.object = objectId(path);
 
     Vec3 normal_camera;
-    if (material.isTextured()) {
+    if (material.isTextured() && !is_prefiltered) {
         Mat3 camera_from_normal = run.camera_from_normal;
         float length_scale = run.length_scale;
         ChildRef mesh_ref = run.child;

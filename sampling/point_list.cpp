@@ -3,10 +3,13 @@
 
 #include <core/image.h>
 #include <core/rng.h>
+#include <scenegraph/object_id.h>
 #include <scenegraph/surface_at.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
+#include <map>
 #include <utility>
 
 namespace stipple {
@@ -81,7 +84,38 @@ PointLists::PointLists(const Scene& scene)
     for (const Mesh& mesh : scene.meshes) mesh_slots_.emplace_back(mesh.nodes.size());
     for (size_t g = 0; g < scene.groups.size(); ++g) {
         const Group& group = scene.groups[g];
-        group_slots_.emplace_back(group.depth == 1 && uses[g] >= kOften ? group.nodes.size() : 0);
+        group_slots_.emplace_back(uses[g] >= kOften ? group.nodes.size() : 0);
+    }
+    followGroups();
+}
+
+// What is known of each group, as the scene is now.
+void PointLists::followGroups() {
+    factors_.clear();
+    factor_of_ = std::vector<std::atomic<const SpacingTable*>>(scene_.groups.size());
+    is_deep_.resize(scene_.groups.size());
+    for (size_t g = 0; g < scene_.groups.size(); ++g) is_deep_[g] = scene_.groups[g].depth > 1;
+    findStale();
+}
+
+// Children before parents is not how groups are stored: a walk that remembers.
+void PointLists::findStale() {
+    const std::vector<Group>& groups = scene_.groups;
+    is_stale_.assign(groups.size(), false);
+    const auto isChanged = [&](const Group& group) { return group.area != group.as_child.area; };
+    if (std::none_of(groups.begin(), groups.end(), isChanged)) return;
+    // As deep as groups are nested, at most.
+    for (bool is_new = true; is_new;) {
+        is_new = false;
+        for (size_t g = 0; g < groups.size(); ++g) {
+            const InstanceStore& instances = groups[g].instances;
+            for (size_t i = 0; !is_stale_[g] && groups[g].depth > 1 && i < instances.size(); ++i) {
+                const ChildRef child = instances.child(i);
+                if (child.isNone() || !child.isGroup()) continue;
+                if (is_stale_[child.index()] || isChanged(groups[child.index()]))
+                    is_stale_[g] = is_new = true;
+            }
+        }
     }
 }
 
@@ -127,6 +161,72 @@ const VisibleArea& PointLists::visibleArea(uint32_t mesh, int direction) {
     return seen(mesh, direction).area;
 }
 
+namespace {
+
+// Layers behind each other are about as many from anywhere; from these directions they are counted.
+constexpr int kFactorDirections[] = {3, 14, 25};
+// Metres. Octaves beyond a mesh's own are as its last.
+constexpr float kFirstFactorSpacing = 1.0f / 256;
+
+template <class At>
+void addTable(SpacingTable& sum, double weight, const At& at) {
+    float spacing = sum.first_spacing;
+    for (float& factor : sum.factors) {
+        factor += float(weight) * at(spacing);
+        spacing *= 2.0f;
+    }
+}
+
+}  // namespace
+
+SpacingTable PointLists::makeFactor(ChildRef child) {
+    SpacingTable table;
+    table.first_spacing = kFirstFactorSpacing;
+    if (!child.isGroup()) {
+        const bool is_plant = hidesItself(scene_.meshes[child.index()]);
+        for (const int direction : kFactorDirections) {
+            constexpr double kShare = 1.0 / double(std::size(kFactorDirections));
+            addTable(table, kShare, [&](float spacing) {
+                if (!is_plant) return 1.0f;
+                return visibleArea(child.index(), direction).whole_factor.at(spacing);
+            });
+        }
+        return table;
+    }
+    const Group& group = scene_.groups[child.index()];
+    std::map<uint32_t, double> areas;  // of its children
+    double sum = 0.0;
+    for (size_t i = 0; i < group.instances.size(); ++i) {
+        const ChildRef inner = group.instances.child(i);
+        if (inner.isNone()) continue;
+        const double area = childArea(scene_, inner) * group.instances.areaScale(i);
+        areas[inner.bits] += area;
+        sum += area;
+    }
+    for (const auto& [bits, area] : areas) {
+        const SpacingTable& inner = factorOf(ChildRef{bits});
+        addTable(table, area / std::max(sum, 1e-300),
+                 [&](float spacing) { return inner.at(spacing); });
+    }
+    return table;
+}
+
+const SpacingTable& PointLists::factorOf(ChildRef child) {
+    const auto found = factors_.find(child.bits);
+    if (found != factors_.end()) return found->second;
+    const SpacingTable made = makeFactor(child);
+    return factors_.emplace(child.bits, made).first->second;
+}
+
+const SpacingTable& PointLists::wholeFactor(uint32_t group) {
+    if (const SpacingTable* known = factor_of_[group].load(std::memory_order_acquire))
+        return *known;
+    const std::lock_guard lock(factor_mutex_);
+    const SpacingTable& made = factorOf(ChildRef::group(group));
+    factor_of_[group].store(&made, std::memory_order_release);
+    return made;
+}
+
 PointLists::Slot& PointLists::slotOf(const ListName& name) {
     const uint32_t index = name.child.index();
     if (name.direction != ListName::kWhole) return seen(index, name.direction).slot;
@@ -154,16 +254,17 @@ void PointLists::sceneChanged(const SceneChanges& changes) {
         Slots& slots = group_slots_[changed.group];
         if (changed.node < slots.size()) drop(slots[changed.node]);
     }
+    const std::vector<bool> was_deep = is_deep_;
+    followGroups();
     for (size_t g = 0; g < group_slots_.size(); ++g) {
         Slots& slots = group_slots_[g];
         const size_t n = scene_.groups[g].nodes.size();
         if (slots.empty()) continue;
-        if (changes.all_nodes || scene_.groups[g].depth > 1) {
+        // What has changed may lie anywhere within groups of groups.
+        if (changes.all_nodes || is_deep_[g] || (g < was_deep.size() && was_deep[g])) {
             for (Slot& slot : slots) drop(slot);
         }
-        if (scene_.groups[g].depth > 1) {
-            slots = Slots();
-        } else if (slots.size() < n) {
+        if (slots.size() < n) {
             Slots more(n);
             for (size_t i = 0; i < slots.size(); ++i) {
                 more[i].list = slots[i].list.load();
@@ -211,6 +312,7 @@ struct Point {
     bool single_sided = false;
     uint16_t material = 0;
     uint32_t instance = 0;
+    uint8_t levels = 1;
 };
 
 template <class T>
@@ -248,13 +350,55 @@ Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const std::vector<T>& 
 // Places on a triangle that are tried for one that a mask lets stand.
 constexpr uint64_t kMaskAttempts = 8;
 
-Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, const PointKey& key) {
-    const InstancePoint at = instanceAt(scene, group, node, listPosition(key));
-    const Mesh& mesh = scene.meshes[group.instances.child(at.instance).index()];
-    const Affine group_from_mesh = group.instances.groupFromChild(at.instance);
-    const double area_scale = std::max(group.instances.areaScale(at.instance), 1e-30);
+// Surface of groups within groups is looked at from so far that a point stands for its patch: its
+// colour there, whatever texture it has.
+void prefilter(const Scene& scene, const Mesh& mesh, Point& p) {
+    if (!p.is_textured) return;
+    LookupBeam beam;
+    beam.diameter = p.patch_width;
+    beam.direction = Vec3(p.normal);
+    const MeshSurface surface =
+        surfaceAt(mesh, scene.materials, scene.textures, p.at.triangle, p.at.u, p.at.v, beam);
+    p.shading_normal = surface.normal_object;
+    p.albedo = surface.albedo;
+    p.is_textured = false;
+}
+
+// Positions known no better than to this share of what they run along are not random there.
+constexpr double kCoarsePosition = 1.0 / 16;
+
+Point makeGroupPoint(const Scene& scene, const Group& outermost, uint32_t node,
+                     const PointKey& key) {
+    const Group* group = &outermost;
+    InstancePoint at = instanceAt(scene, *group, node, listPosition(key));
+    ChildRef child = group->instances.child(at.instance);
+    Affine group_from_mesh = group->instances.groupFromChild(at.instance);
+    // Sums go by the product of what each level's transform does to areas at most.
+    double area_scale = group->instances.areaScale(at.instance);
+    uint64_t path = extendObjectPath(0, group->listed_index[at.instance]);
+    int levels = 1;
+    // Each level uses up digits of the position: where none are left, more are drawn.
+    double resolution = positionResolution(key.sampler) / std::max(at.share, 1e-12);
+    for (; child.isGroup(); ++levels) {
+        group = &scene.groups[child.index()];
+        if (resolution > kCoarsePosition) {
+            at.position = uniformDouble(hashCombine(key.list, key.index, uint64_t(levels), 8));
+            resolution = positionResolution(Sampler::kRandom);
+        }
+        at = instanceAt(scene, *group, 0, at.position);
+        resolution /= std::max(at.share, 1e-12);
+        child = group->instances.child(at.instance);
+        group_from_mesh = group_from_mesh * group->instances.groupFromChild(at.instance);
+        area_scale *= group->instances.areaScale(at.instance);
+        path = extendObjectPath(path, group->listed_index[at.instance]);
+    }
+    if (resolution > kCoarsePosition && levels > 1)
+        at.position = uniformDouble(hashCombine(key.list, key.index, uint64_t(levels), 8));
+    area_scale = std::max(area_scale, 1e-30);
+    const Mesh& mesh = scene.meshes[child.index()];
     const float length_scale = float(std::sqrt(area_scale));
     Point p = makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], at.position, key);
+    if (outermost.depth > 1) prefilter(scene, mesh, p);
     // Drawn for the largest area scale of the transform; this orientation's may be smaller.
     DMat3 area_map = cofactor(group_from_mesh.linear);
     area_map *= (glm::dot(group_from_mesh.linear[0], area_map[0]) < 0.0 ? -1.0 : 1.0) / area_scale;
@@ -263,7 +407,8 @@ Point makeGroupPoint(const Scene& scene, const Group& group, uint32_t node, cons
     const DVec3 shading = area_map * DVec3(p.shading_normal);
     p.shading_normal = Vec3(shading / std::max(glm::length(shading), 1e-30));
     p.patch_width *= length_scale;
-    p.instance = at.instance;
+    p.instance = outermost.depth > 1 ? uint32_t(path) : at.instance;
+    p.levels = uint8_t(std::min(levels, 255));
     return p;
 }
 
@@ -284,6 +429,7 @@ void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
     out.albedo_or_place[lane] = p.is_textured ? packPlace({p.at.u, p.at.v}) : packSrgb8(p.albedo);
     out.material[lane] = p.material;
     out.instance[lane] = p.instance;
+    out.levels[lane] = p.levels;
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <scenegraph/visible_area.h>
 
 #include <atomic>
+#include <map>
 #include <memory>
 #include <mutex>
 
@@ -34,7 +35,11 @@ struct ListBlock {
     uint32_t normal_or_triangle[kBlockPoints];
     uint32_t albedo_or_place[kBlockPoints];
     uint16_t material[kBlockPoints];
-    uint32_t instance[kBlockPoints];  // in lists of groups: of the group's InstanceStore
+    // In lists of groups: the instance of the group's InstanceStore or, where groups lie within,
+    // the low half of the object path from there on, so many levels deep; the point is prefiltered
+    // then.
+    uint32_t instance[kBlockPoints];
+    uint8_t levels[kBlockPoints];
 };
 
 uint32_t packOctahedral(const Vec3& unit);
@@ -69,9 +74,10 @@ public:
     explicit PointLists(const Scene& scene);
     ~PointLists();
 
-    // Meshes have lists, and innermost groups with many instances of their own: one list serves
-    // all.
-    bool hasLists(ChildRef child) const { return !slotsOf(child).empty(); }
+    // Meshes have lists, and groups with many instances of their own: one list serves all.
+    bool hasLists(ChildRef child) const {
+        return !slotsOf(child).empty() && !(child.isGroup() && is_stale_[child.index()]);
+    }
     // Call between frames: drops the lists of nodes that have changed, keeps the others.
     void sceneChanged(const SceneChanges& changes);
     // Call between frames: sets the identity (a new one empties the cache) and the budget. Where
@@ -81,6 +87,9 @@ public:
     // What can be seen of a mesh from a direction; measured when first asked for, then kept for the
     // frame at least, and beyond it within the budget. Thread-safe.
     const VisibleArea& visibleArea(uint32_t mesh, int direction);
+    // How much of the points on the whole of a group makes it cover what it should: of its meshes
+    // the mean, by area (VisibleArea::whole_factor); kept like visibleArea(). Thread-safe.
+    const SpacingTable& wholeFactor(uint32_t group);
     // Points [first, first + count) of a sequence, which must not cross a multiple of 64:
     // lanes [first_lane, first_lane + count) of the block returned. From the cache, which first
     // grows to `list_length` points if the budget allows, else made in `scratch`. The same bits
@@ -114,11 +123,23 @@ private:
     template <class Visit>
     void forEachSlot(const Visit& visit);
     void makePoints(const ListName& name, uint32_t first, int count, ListBlock& out);
+    void findStale();
+    void followGroups();
+    const SpacingTable& factorOf(ChildRef child);
+    SpacingTable makeFactor(ChildRef child);
     List* grow(Slot& slot, const ListName& name, uint32_t n_blocks);
 
     const Scene& scene_;
     std::vector<Slots> mesh_slots_, group_slots_;
+    // Groups that lie below an edit which the sums around do not know yet: their lists would be
+    // wrong.
+    std::vector<bool> is_stale_;
     std::vector<std::atomic<Seen*>> seen_;  // by mesh and direction
+    // Made when needed, meshes' and groups' by ChildRef::bits; lookups go by factor_of_.
+    std::map<uint32_t, SpacingTable> factors_;
+    std::vector<std::atomic<const SpacingTable*>> factor_of_;  // by group
+    std::mutex factor_mutex_;
+    std::vector<bool> is_deep_;  // groups that hold groups: their lists' points are prefiltered
     ListIdentity identity_;
     size_t budget_ = 0;
     std::atomic<size_t> bytes_{0}, visible_bytes_{0};

@@ -88,12 +88,11 @@ void PointWriter::add(const InstanceFrame& frame, const ListName& name, const Ru
     }
 }
 
-uint32_t PointWriter::firstOf(uint64_t path, uint32_t count) const {
+uint32_t PointWriter::firstOf(uint64_t path, uint32_t count, uint32_t length) const {
     const RenderSettings& settings = context_.settings;
     const uint64_t hash = hashCombine(settings.seed, path, 5);
     if (settings.sampler == Sampler::kRandom) return uint32_t(hash);
-    const uint32_t piece = std::max(16u, std::bit_ceil(count)),
-                   length = uint32_t(settings.list_length);
+    const uint32_t piece = std::max(16u, std::bit_ceil(count));
     return piece * 2 <= length ? uint32_t(hash % (length / piece)) * piece : 0;
 }
 

@@ -25,8 +25,9 @@ public:
     void add(const InstanceFrame& frame, const ListName& list, const RunDensity& density,
              uint32_t first, uint32_t count);
     // Where in a list an instance that needs few points begins: an aligned piece, another one for
-    // each instance, so that equal trees do not show equal points.
-    uint32_t firstOf(uint64_t path, uint32_t count) const;
+    // each instance, so that equal trees do not show equal points. length: of the part of the list
+    // that pieces are taken from.
+    uint32_t firstOf(uint64_t path, uint32_t count, uint32_t length) const;
     // Hands over what has gathered.
     void flush();
 

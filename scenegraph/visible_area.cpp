@@ -28,6 +28,13 @@ Vec3 directionOf(int index) {
     return glm::normalize(d);
 }
 
+bool hidesItself(const Mesh& mesh) {
+    // So few triangles hide little of each other; a mesh of so many (a terrain) is seldom a plant,
+    // and measuring it takes time and memory.
+    constexpr size_t kFewTriangles = 64, kManyTriangles = 400000;
+    return mesh.triangles.size() >= kFewTriangles && mesh.triangles.size() <= kManyTriangles;
+}
+
 float SpacingTable::at(float spacing) const {
     const float octave = std::clamp(std::log2(spacing / first_spacing), 0.0f, kOctaves - 1.001f);
     const size_t i = size_t(octave);

@@ -30,6 +30,9 @@ struct SpacingTable {
     float at(float spacing) const;  // interpolated
 };
 
+// Whether there may be much of a mesh that its own front hides, and measuring it pays.
+bool hidesItself(const Mesh& mesh);
+
 struct VisibleArea {
     // What the triangles before each cover of the picture (at right angles to the direction, object
     // space, m^2): triangles.size() + 1 entries, a distribution list.

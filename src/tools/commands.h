@@ -17,6 +17,7 @@ ExitCode runCompare(const std::vector<std::string>& arguments);
 ExitCode runBench(const std::vector<std::string>& arguments);
 ExitCode runEditScene(const std::vector<std::string>& arguments);
 ExitCode runView(const std::vector<std::string>& arguments);
+ExitCode runStudyCommand(const std::vector<std::string>& arguments);
 ExitCode runGenerate(const std::vector<std::string>& arguments);
 ExitCode runHelp(const std::vector<std::string>& arguments);
 

@@ -38,6 +38,7 @@ const std::vector<Command>& commandTable() {
         {"bench", "measure points beside rays and the z-buffer", runBench},
         {"edit", "change a scene line by line, and look at it", runEditScene},
         {"view", "look around in a window, and edit", runView},
+        {"study", "sweep settings and sizes, and report", runStudyCommand},
         {"generate", "make trees, rocks, terrains, forests and landscapes", runGenerate},
         {"help", "explain a command, or list the settings", runHelp},
     };

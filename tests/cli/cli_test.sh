@@ -687,6 +687,92 @@ case_interrupt_bench() {
     expect_no_file 'reference*'
 }
 
+# A study of the sphere; $1: further keys, each with a comma at its end.
+write_study() {
+    write_scene
+    cat >ball.study.json <<JSON
+{
+  "scene": "scene.scene.json", ${1:-}
+  "settings": { "width": 32, "height": 24, "reconstruct": "splat" },
+  "repetitions": 3, "later_frames": 1, "reference_rays": 4,
+  "sweeps": [ { "name": "points", "axes": { "samples": [0.5, 1, 2], "zoom": [1, 2] } },
+              { "name": "raycast", "settings": { "method": "raycast" }, "axes": { "samples": [1] }, "reference": true } ],
+  "plots": [ { "title": "a plot", "x": "points_drawn", "y": "later_seconds", "sweeps": ["points"], "fit": "linear" } ]
+}
+JSON
+    export STIPPLE_CACHE=$PWD/cache
+}
+
+case_study() {
+    write_study
+    expect_ok study ball.study.json -o result --json out.json
+    expect_stdout '^result/report\.html$'
+    expect_stdout 'R² = '
+    [[ $(wc -l <result/rows.csv) == 22 ]] || fail "not 21 rows"
+    [[ $(cut -d, -f1 result/rows.csv | sort -u | wc -l) == 22 ]] || fail "a row is there twice"
+    grep -q '"title": "a plot"' out.json || fail "no plot in the JSON"
+    [[ -s result/pictures/$(sed -n 2p result/rows.csv | cut -d, -f1).png ]] || fail "no picture"
+    # Nothing is left to do, and nothing is done.
+    cp result/rows.csv before.csv
+    expect_ok study ball.study.json -o result
+    cmp -s before.csv result/rows.csv || fail "rows changed"
+    # The standard study of a scene.
+    expect_ok study --help
+}
+
+case_study_errors() {
+    write_study
+    expect_error 2 'STUDY' study -o result
+    expect_error 2 'output' study ball.study.json
+    expect_error 3 'missing\.study\.json' study missing.study.json -o result
+    sed 's/"samples": \[0.5/"sampels": [0.5/' ball.study.json >bad.study.json
+    expect_error 3 "/sweeps/0/axes/sampels/0.*did you mean 'samples'" study bad.study.json -o result
+    sed 's/"points_drawn"/"points_drwan"/' ball.study.json >bad.study.json
+    expect_error 3 '/plots/0/x.*"points_drawn"' study bad.study.json -o result
+    sed 's/"repetitions": 3/"repetitions": 0/' ball.study.json >bad.study.json
+    expect_error 3 '/repetitions' study bad.study.json -o result
+    sed 's/"zoom": \[1, 2\]/"camera": ["side"]/' ball.study.json >bad.study.json
+    expect_error 2 "'side'" study bad.study.json -o result -q
+    mkdir foreign && echo "a,b" >foreign/rows.csv
+    expect_error 3 'foreign/rows\.csv' study ball.study.json -o foreign -q
+    expect_error 3 'nowhere/rows\.csv' study --compare nowhere nowhere
+}
+
+# Interrupted at any moment, and started again, it completes with each row once.
+case_study_resumes() {
+    write_study
+    sed 's/"repetitions": 3/"repetitions": 1000/' ball.study.json >long.study.json
+    interrupt INT 1 study long.study.json -o result
+    [[ $(wc -l <result/rows.csv) -gt 2 ]] || fail "nothing was kept"
+    head -n 9 result/rows.csv >some.csv
+    mv some.csv result/rows.csv
+    expect_ok study ball.study.json -o result
+    # As if it had been killed while it wrote: a line in the middle, then half a line.
+    head -c 5000 result/rows.csv >half.csv
+    mv half.csv result/rows.csv
+    expect_ok study ball.study.json -o result
+    [[ $(cut -d, -f1 result/rows.csv | sort -u | wc -l) == 22 && $(wc -l <result/rows.csv) == 22 ]] ||
+        fail "rows are missing or there twice"
+}
+
+case_study_compare() {
+    write_study
+    expect_ok study ball.study.json -o one
+    expect_ok study --compare one one --json same.json
+    expect_stdout '^0 of [0-9]+ numbers changed'
+    expect_ok study ball.study.json -o two
+    # Twice the points drawn, as if the program had become worse.
+    python3 - <<'PY'
+import csv
+rows = list(csv.DictReader(open('two/rows.csv')))
+for row in rows: row['points_drawn'] = str(2 * float(row['points_drawn']))
+out = csv.DictWriter(open('two/rows.csv', 'w'), rows[0].keys(), lineterminator='\n')
+out.writeheader(); out.writerows(rows)
+PY
+    expect_ok study --compare one two
+    expect_stdout 'points_drawn .* \+100.0 %'
+}
+
 declare -F "case_$3" >/dev/null || fail "there is no case $3"
 "case_$3"
 echo "passed"

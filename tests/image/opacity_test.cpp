@@ -71,5 +71,69 @@ TEST_P(Opacity, treesCoverWhatRaysSeeForAnyDensity) {
 
 INSTANTIATE_TEST_SUITE_P(species, Opacity, testing::Values("oak", "spruce", "birch", "pine"));
 
+// A square of trees of which each is far smaller than a subpixel, as groups of groups of groups.
+Scene farSquares(int levels) {
+    Scene scene = rowOfTrees("oak");
+    scene.groups.clear();
+    Group tree;
+    tree.instances = InstanceStore(DBox3{DVec3(-1), DVec3(1)});
+    tree.instances.add(ChildRef::mesh(0), Affine());
+    scene.groups.push_back(std::move(tree));
+    double step = 24.0;
+    for (int level = 0; level < levels; ++level, step *= 4.0) {
+        Group square;
+        square.instances = InstanceStore(DBox3{DVec3(-step * 4), DVec3(step * 4)});
+        for (int i = 0; i < 16; ++i) {
+            Affine a;
+            // Off the lattice, or it makes patterns with that of the pixels.
+            const double off = level == 0 ? 0.3 : 0.0;
+            const double x = i % 4 - 1.5 + off * std::sin(37.0 * i),
+                         z = i / 4 - 1.5 + off * std::sin(91.0 * i);
+            a.translation = DVec3(step * x, 0.0, step * z);
+            square.instances.add(ChildRef::group(uint32_t(level)), a);
+        }
+        scene.groups.push_back(std::move(square));
+    }
+    scene.root = uint32_t(levels);
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    return scene;
+}
+
+TEST(OpacityFarAway, groupsOfGroupsCoverWhatRaysSee) {
+    double mean = 0.0;
+    for (const int levels : {4, 6, 8}) {
+        const Scene scene = farSquares(levels);
+        const double side = 24.0 * std::pow(4.0, levels);
+        FrameRequest r;
+        r.camera = lookAt(DVec3(0.0, side, 0.2 * side), DVec3(0.0));
+        r.camera.fov_y = 0.6;
+        r.camera.near_z = side * 0.01;
+        r.settings.width = r.settings.height = 96;
+        r.settings.subpixels = 2;
+        r.transparent = true;
+        ThreadPool pool(2);
+        Renderer renderer(scene, pool);
+        const auto coverage = [&](Method method, double samples) {
+            r.settings.method = method;
+            r.settings.samples = samples;
+            const Image image = renderer.render(r).image;
+            double sum = 0.0;
+            for (size_t i = 3; i < image.data.size(); i += image.channels.size())
+                sum += image.data[i];
+            return sum / (96.0 * 96.0);
+        };
+        const double rays = coverage(Method::kRaycast, 16);
+        EXPECT_GT(rays, 0.2);
+        // The same list is shown many times, so single pictures deviate.
+        for (const double k : {0.3, 1.0, 4.0}) {
+            const double ratio = coverage(Method::kPoints, k) / rays;
+            EXPECT_NEAR(ratio, 1.0, 0.2) << levels << " levels, K " << k;
+            mean += ratio / 9.0;
+        }
+    }
+    EXPECT_NEAR(mean, 1.0, 0.05);
+}
+
 }  // namespace
 }  // namespace stipple
