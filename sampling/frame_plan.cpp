@@ -70,6 +70,10 @@ private:
                                              p.camera_from_child.translation, mesh.nodes[0].bounds);
         if (!box.is_visible) return;
         const double area_scale = maxAreaScale(p.camera_from_child.linear);
+        if (mesh.surfels && !rasterize_all_) {  // opens its own blocks
+            addBatch(p, box, std::min(mesh.area * box.bound * area_scale, 1e9));
+            return;
+        }
         if (rasterize_all_ || mayBeLarge(mesh.nodes[0].max_triangle_area, box.bound * area_scale)) {
             collectLargeTriangles(p, mesh, area_scale);
         }

@@ -17,7 +17,8 @@ TileCut::TileCut(const Scene& scene, const View& view, const RenderSettings& set
       plan_(plan),
       points_(context_),
       group_points_(context_, points_),
-      triangles_(context_) {}
+      triangles_(context_),
+      surfels_(context_) {}
 
 void TileCut::emit(const Batch& batch, PointSink& sink) {
     const PlannedNode& planned = plan_.nodes[batch.index];
@@ -36,6 +37,11 @@ void TileCut::emit(const Batch& batch, PointSink& sink) {
 
 void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample) const {
     const Run& run = context_.runOf(number);
+    if (run.surfel_level >= 0) {
+        const uint32_t place = (number % kBlockPoints) >> run.surfels_per_number_shift;
+        surfelAttributes(context_.scene, context_.view, run, run.first_index + place, sample);
+        return;
+    }
     const uint32_t index = run.first_index + number % kBlockPoints;
     if (run.triangle_frame != kNotTriangles) {
         triangleAttributes(context_.scene, context_.view,
@@ -143,6 +149,10 @@ void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& c
                        uint64_t path, const BoxProjection& box) {
     if (context_.scene.meshes[mesh_index].triangles.empty()) return;
     const InstanceFrame frame = makeInstanceFrame(camera_from_object, path);
+    if (context_.scene.meshes[mesh_index].surfels) {
+        points_.flush();
+        if (surfels_.draw(mesh_index, frame, box.z_min)) return;
+    }
     SeenMesh seen;
     if (node_index == 0 && box.depth_ratio <= context_.settings.cut_ratio) {
         const RunDensity density = meshDensity(frame, box);

@@ -7,6 +7,7 @@
 #include <sampling/group_points.h>
 #include <sampling/mesh_points.h>
 #include <sampling/projection.h>
+#include <sampling/surfel_points.h>
 #include <sampling/triangle_writer.h>
 
 namespace stipple {
@@ -50,6 +51,7 @@ private:
     PointWriter points_;
     GroupPoints group_points_;
     TriangleWriter triangles_;
+    SurfelPoints surfels_;
     std::vector<Opened> opened_;  // a stack: each opening uses its end
 };
 

@@ -6,8 +6,10 @@
 #pragma once
 
 #include <core/math.h>
+#include <scenegraph/surfel_model.h>
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -54,6 +56,11 @@ struct Mesh {
     std::vector<Vec4> colors;  // linear RGBA, multiplied with the material's colour; empty: white
     std::vector<UVec3> triangles;             // counter-clockwise seen from the front
     std::vector<uint16_t> triangle_material;  // index into Scene::materials, one a triangle
+
+    // A prebuilt model, which is drawn in place of the triangles where these would be too coarse;
+    // its finishes are the scene's materials from first_finish on. Null for meshes.
+    std::shared_ptr<const SurfelModel> surfels;
+    uint32_t first_finish = 0;
 
     // What buildMesh() adds; it also sorts the triangles (strata, then Morton order).
     std::vector<MeshNode> nodes;

@@ -369,9 +369,10 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
 size_t Mesh::bytes() const {
     size_t more_uv_bytes = 0;
     for (const auto& layer : more_uvs) more_uv_bytes += layer.size() * sizeof(Vec2);
-    return more_uv_bytes + tangents.size() * sizeof(Vec4) + positions.size() * sizeof(Vec3) +
-           normals.size() * sizeof(Vec3) + uvs.size() * sizeof(Vec2) +
-           colors.size() * sizeof(Vec4) +
+    const size_t surfel_bytes = surfels ? surfels->bytes() : 0;
+    return surfel_bytes + more_uv_bytes + tangents.size() * sizeof(Vec4) +
+           positions.size() * sizeof(Vec3) + normals.size() * sizeof(Vec3) +
+           uvs.size() * sizeof(Vec2) + colors.size() * sizeof(Vec4) +
            triangles.size() * (sizeof(UVec3) + sizeof(uint16_t) + sizeof(uint8_t)) +
            nodes.size() * sizeof(MeshNode) + cumulative_area.size() * sizeof(double);
 }

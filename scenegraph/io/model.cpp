@@ -3,6 +3,7 @@
 
 #include <scenegraph/io/gltf.h>
 #include <scenegraph/io/json.h>
+#include <scenegraph/io/surfel_file.h>
 
 #include <limits>
 
@@ -21,7 +22,7 @@ std::string extensionOf(const std::filesystem::path& path) {
 bool isModelFile(const std::filesystem::path& path) {
     const std::string extension = extensionOf(path);
     return extension == ".gltf" || extension == ".glb" || extension == ".ply" ||
-           extension == ".obj";
+           extension == ".obj" || extension == ".stipple";
 }
 
 ChildRef loadModel(const std::filesystem::path& path, const std::string& name, Scene& scene,
@@ -29,6 +30,7 @@ ChildRef loadModel(const std::filesystem::path& path, const std::string& name, S
     context.throwIfCancelled();
     const std::string extension = extensionOf(path);
     if (extension == ".ply") return loadPly(path, name, scene, context);
+    if (extension == ".stipple") return loadSurfelModel(path, name, scene, context);
     if (extension == ".obj") return loadObj(path, name, scene, context);
     return loadGltf(path, name, scene, context);
 }

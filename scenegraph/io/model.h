@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Model files (.gltf, .glb, .ply, .obj) within the loading of a scene.
+// Model files (.gltf, .glb, .ply, .obj, .stipple) within the loading of a scene.
 #pragma once
 
 #include <scenegraph/io/load_context.h>
@@ -11,7 +11,7 @@ namespace stipple {
 
 // By the extension, in any case.
 bool isModelFile(const std::filesystem::path& path);
-inline constexpr const char* kModelExtensions = ".gltf, .glb, .ply or .obj";
+inline constexpr const char* kModelExtensions = ".gltf, .glb, .ply, .obj or .stipple";
 
 // Adds what the file shows to the scene and returns the child to instance: a mesh, or a group.
 // name: how errors call the file. Throws as loadScene() does.

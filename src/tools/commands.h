@@ -18,6 +18,7 @@ ExitCode runBench(const std::vector<std::string>& arguments);
 ExitCode runEditScene(const std::vector<std::string>& arguments);
 ExitCode runView(const std::vector<std::string>& arguments);
 ExitCode runStudyCommand(const std::vector<std::string>& arguments);
+ExitCode runBuild(const std::vector<std::string>& arguments);
 ExitCode runGenerate(const std::vector<std::string>& arguments);
 ExitCode runHelp(const std::vector<std::string>& arguments);
 

@@ -39,6 +39,7 @@ const std::vector<Command>& commandTable() {
         {"edit", "change a scene line by line, and look at it", runEditScene},
         {"view", "look around in a window, and edit", runView},
         {"study", "sweep settings and sizes, and report", runStudyCommand},
+        {"build", "make models of points", runBuild},
         {"generate", "make trees, rocks, terrains, forests and landscapes", runGenerate},
         {"help", "explain a command, or list the settings", runHelp},
     };

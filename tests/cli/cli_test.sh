@@ -773,6 +773,37 @@ PY
     expect_stdout 'points_drawn .* \+100.0 %'
 }
 
+case_build() {
+    write_scene
+    expect_ok build scene.scene.json --as point-blocks -o ball.stipple --set resolution=48 --json built.json
+    expect_stdout 'bits a point'
+    grep -q '"points_per_pixel"' built.json || fail "no report"
+    expect_ok render ball.stipple -o ball.png "${tiny[@]}"
+    expect_ok info ball.stipple
+    # As an asset of a scene, instanced.
+    cat >many.scene.json <<JSON
+{ "version": 1, "assets": { "ball": { "file": "ball.stipple" } }, "root": "many",
+  "groups": { "many": { "grid": { "child": "ball", "counts": [3, 1, 3], "spacing": [2, 1, 2] } } } }
+JSON
+    expect_ok render many.scene.json -o many.png "${tiny[@]}"
+}
+
+case_build_errors() {
+    write_scene
+    expect_error 2 "'voxels'" build scene.scene.json --as voxels -o a.stipple
+    expect_error 2 'stipple' build scene.scene.json --as point-blocks -o a.png
+    expect_error 2 'resolution' build scene.scene.json --as point-blocks -o a.stipple --set resolution=7
+    expect_error 2 "'size'" build scene.scene.json --as point-blocks -o a.stipple --set size=7
+    expect_error 3 'missing\.glb' build missing.glb --as point-blocks -o a.stipple
+    expect_ok build scene.scene.json --as point-blocks -o ball.stipple --set resolution=32
+    head -c 2000 ball.stipple >cut.stipple
+    expect_error 3 'cut\.stipple: ' render cut.stipple -o a.png
+    echo "no model" >text.stipple
+    expect_error 3 'text\.stipple: is no model' render text.stipple -o a.png
+    interrupt INT 1 build scene.scene.json --as point-blocks -o big.stipple --set resolution=2048
+    expect_no_file 'big.stipple*'
+}
+
 declare -F "case_$3" >/dev/null || fail "there is no case $3"
 "case_$3"
 echo "passed"

@@ -1,0 +1,471 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <sampling/point_blocks.h>
+
+#include <core/error.h>
+#include <core/stopwatch.h>
+#include <scenegraph/visible_area.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+
+namespace stipple {
+
+void applyOption(PointBlockOptions& options, const std::string& key, const std::string& value) {
+    const auto refuse = [&](const std::string& values) {
+        throw Error(ErrorCode::kInvalidArgument, "--set",
+                    "'" + value + "' is not a value of " + key + " (" + values + ")");
+    };
+    const auto number = [&](double low, double high, const char* values) {
+        double v = 0.0;
+        const auto [rest, error] = std::from_chars(value.data(), value.data() + value.size(), v);
+        if (error != std::errc() || rest != value.data() + value.size() || !(v >= low && v <= high))
+            refuse(values);
+        return v;
+    };
+    const auto onOff = [&] {
+        if (value != "on" && value != "off") refuse("on|off");
+        return value == "on";
+    };
+    if (key == "resolution") {
+        options.resolution = int(number(8, 2048, "8..2048"));
+    } else if (key == "tolerance_angle") {
+        options.tolerance_angle = number(0, 80, "0..80");
+    } else if (key == "block_size") {
+        options.block_size = int(number(1, 64, "1..64"));
+    } else if (key == "lattice") {
+        if (value != "triangles" && value != "squares") refuse("triangles|squares");
+        options.equilateral = value == "triangles";
+    } else if (key == "scored") {
+        options.scored = onOff();
+    } else if (key == "partial") {
+        options.partial = onOff();
+    } else if (key == "directions") {
+        if (value != "6" && value != "32" && value != "128") refuse("6|32|128");
+        options.directions = std::stoi(value);
+    } else {
+        throw Error(ErrorCode::kInvalidArgument, "--set",
+                    "unknown option '" + key +
+                        "' of point-blocks (resolution, tolerance_angle, block_size, lattice, "
+                        "scored, partial, directions)");
+    }
+}
+
+namespace {
+
+constexpr float kEyeDistance = 20.0f;    // of orthographic rays, in radii: footprints hardly grow
+constexpr float kDepthTolerance = 2.0f;  // pixels: what lies no deeper is the same surface
+constexpr int kRotations = 4, kShifts = 4, kTests = kRotations * kShifts;
+constexpr uint32_t kNobody = 0xffffffffu;
+
+struct Sample {
+    Vec3 position = Vec3(0), normal = Vec3(0), albedo = Vec3(0);  // relative to the centre
+    float facing = 0.0f;  // cosine of the angle to the projection's direction
+    uint8_t finish = 0;
+};
+
+Vec3 projectionOf(int index, int count) {
+    if (count == 6) {
+        Vec3 axis(0.0f);
+        axis[index / 2] = index % 2 ? -1.0f : 1.0f;
+        return axis;
+    }
+    return count == 32 ? directionOf(index) : maskDirectionOf(index);
+}
+
+// Orthonormal, z towards the viewer, turned about it.
+Mat3 viewFromObject(const Vec3& to_viewer, float angle) {
+    const Vec3 other = std::abs(to_viewer.y) < 0.9f ? Vec3(0, 1, 0) : Vec3(1, 0, 0);
+    const Vec3 x = glm::normalize(glm::cross(other, to_viewer)), y = glm::cross(to_viewer, x);
+    const float c = std::cos(angle), s = std::sin(angle);
+    return glm::transpose(Mat3(x * c + y * s, y * c - x * s, to_viewer));
+}
+
+// A picture of a model from far away: pixels of side `pixel`, heights towards the viewer.
+class Picture {
+public:
+    Picture(const Mat3& view, float pixel, float radius, Vec2 shift)
+        : view_(view / pixel),
+          pixel_(pixel),
+          shift_(shift + radius / pixel + 1.0f),
+          side_(int(2.0f * radius / pixel) + 4) {
+        height_.assign(size_t(side_) * size_t(side_), -kInfinity);
+    }
+
+    // Index of the pixel, and the height in pixels.
+    size_t pixelOf(const Vec3& p, float& height) const {
+        const Vec3 q = view_ * p;
+        height = q.z;
+        const int x = std::clamp(int(q.x + shift_.x), 0, side_ - 1),
+                  y = std::clamp(int(q.y + shift_.y), 0, side_ - 1);
+        return size_t(y) * size_t(side_) + size_t(x);
+    }
+    void draw(const Vec3& p) {
+        float height;
+        float& there = height_[pixelOf(p, height)];
+        there = std::max(there, height);
+    }
+    // Whether something stands at p's pixel that is as near as p, or nearer.
+    bool covers(const Vec3& p) const {
+        float height;
+        const size_t i = pixelOf(p, height);
+        return height_[i] >= height - kDepthTolerance;
+    }
+    // Whether p is part of what is seen.
+    bool shows(const Vec3& p, size_t& pixel) const {
+        float height;
+        pixel = pixelOf(p, height);
+        return height >= height_[pixel] - kDepthTolerance;
+    }
+    size_t pixels() const { return height_.size(); }
+
+private:
+    Mat3 view_;
+    float pixel_;
+    Vec2 shift_;
+    int side_;
+    std::vector<float> height_;
+};
+
+Picture testPicture(const Vec3& to_viewer, int test, float pixel, float radius) {
+    const float angle = float(test / kShifts) * float(kPi) / 8.0f;
+    const Vec2 shift(test % 2 ? 0.5f : 0.0f, test % kShifts >= 2 ? 0.5f : 0.0f);
+    return Picture(viewFromObject(to_viewer, angle), pixel, radius, shift);
+}
+
+class Builder {
+public:
+    Builder(const RayCaster& caster, const std::vector<Material>& materials,
+            const std::vector<float>& patch_width, double radius, const PointBlockOptions& options,
+            ThreadPool& pool, const CancelFlag& cancel)
+        : caster_(caster),
+          materials_(materials),
+          patch_width_(patch_width),
+          radius_(float(radius)),
+          options_(options),
+          pool_(pool),
+          cancel_(cancel) {}
+
+    std::vector<SurfelFinish> finishes;
+    PointBlockReport report;
+
+    // Samples without holes where pixels are that large.
+    std::vector<Sample> build(float pixel, const std::function<void(double)>& progress) {
+        const int n = options_.directions;
+        std::vector<std::vector<Sample>> seen(size_t(n) * 1);
+        // A view's samples, block by block; blocks begin at block_begin.
+        std::vector<std::vector<uint32_t>> block_begin(seen.size());
+        for (int d = 0; d < n; ++d) {
+            sampleView(projectionOf(d, n), pixel, seen[size_t(d)], block_begin[size_t(d)]);
+            progress(0.4 * double(d + 1) / n);
+        }
+        std::vector<Sample> chosen;
+        const float adequate = float(std::cos(radians(options_.tolerance_angle)));
+        // First what a view samples well, then what no view does.
+        const int rounds = options_.scored ? 2 : 1;
+        for (int round = 0; round < rounds; ++round) {
+            const float least = options_.scored && round == 0 ? adequate : -1.0f;
+            for (int d = 0; d < n; ++d) {
+                choose(projectionOf(d, n), pixel, seen[size_t(d)], block_begin[size_t(d)], least,
+                       chosen);
+                progress(0.4 + 0.35 * (double(d + 1) / n + round) / rounds);
+            }
+        }
+        seen.clear();
+        report.samples_chosen = std::max(report.samples_chosen, uint64_t(chosen.size()));
+        if (options_.partial) removeNeedless(pixel, chosen);
+        progress(1.0);
+        return chosen;
+    }
+
+    // Which mask directions see each block.
+    void findMasks(float pixel, SurfelLevel& level) {
+        constexpr int kViews = 7;  // within a direction's part of the sphere and a little beyond
+        std::vector<std::vector<uint8_t>> seen_from(kMaskDirections);
+        pool_.forEach(kMaskDirections, [&](size_t m, int) {
+            throwIfAsked();
+            std::vector<uint8_t>& seen = seen_from[m];
+            seen.assign(level.blocks.size(), 0);
+            for (int v = 0; v < kViews; ++v) {
+                const Vec3 middle = maskDirectionOf(int(m));
+                const Mat3 across = glm::transpose(viewFromObject(middle, float(v) * 1.0472f));
+                const Vec3 off = v == 0 ? Vec3(0.0f) : across[0] * 0.2f;
+                Picture picture(viewFromObject(glm::normalize(middle + off), 0.0f), pixel, radius_,
+                                Vec2(0.0f));
+                std::vector<Vec3> positions(level.size());
+                for (const SurfelBlock& b : level.blocks) {
+                    for (uint32_t i = b.first; i < b.first + b.count; ++i) {
+                        positions[i] = unpackSurfel(level, b, i).position;
+                        picture.draw(positions[i]);
+                    }
+                }
+                for (size_t k = 0; k < level.blocks.size(); ++k) {
+                    const SurfelBlock& b = level.blocks[k];
+                    size_t ignored;
+                    for (uint32_t i = b.first; i < b.first + b.count && !seen[k]; ++i)
+                        seen[k] = picture.shows(positions[i], ignored);
+                }
+            }
+        });
+        // Few views see not all: what a neighbouring direction sees may be seen.
+        for (size_t k = 0; k < level.blocks.size(); ++k) {
+            std::array<uint64_t, 2> bits = {0, 0};
+            for (int m = 0; m < kMaskDirections; ++m) {
+                for (int other = 0; other < kMaskDirections; ++other) {
+                    constexpr float kNear = 0.955f;
+                    if (seen_from[size_t(other)][k] &&
+                        glm::dot(maskDirectionOf(m), maskDirectionOf(other)) > kNear) {
+                        bits[size_t(m / 64)] |= 1ull << (m % 64);
+                        break;
+                    }
+                }
+            }
+            level.blocks[k].visible_from = bits;
+        }
+    }
+
+private:
+    void throwIfAsked() const {
+        if (cancel_.requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
+    }
+
+    // Rays on a lattice, towards -to_viewer.
+    void sampleView(const Vec3& to_viewer, float pixel, std::vector<Sample>& samples,
+                    std::vector<uint32_t>& block_begin) {
+        const Mat3 object_from_view = glm::transpose(viewFromObject(to_viewer, 0.0f));
+        const float cosine = float(std::cos(radians(options_.tolerance_angle)));
+        // Sides of the lattice's triangles are `spacing` long; of squares, the diagonals.
+        const float spacing = pixel * cosine * (options_.equilateral ? 1.0f : std::sqrt(0.5f));
+        const Vec2 u(spacing, 0.0f), v = options_.equilateral
+                                             ? Vec2(0.5f * spacing, spacing * std::sqrt(0.75f))
+                                             : Vec2(0.0f, spacing);
+        const int half_v = int(std::ceil(radius_ / v.y)) + 1;
+        const int half_u = int(std::ceil(radius_ / u.x + 0.5f * float(half_v))) + 1;
+        const int b = options_.block_size;
+        const int columns = (2 * half_u + b) / b, rows = (2 * half_v + b) / b;
+        std::vector<std::vector<Sample>> of_row(static_cast<size_t>(rows));
+        std::vector<std::vector<uint32_t>> begin_of_row(of_row.size());
+        pool_.forEach(of_row.size(), [&](size_t row, int) {
+            throwIfAsked();
+            std::vector<Ray> rays;
+            std::vector<RayHit> hits;
+            for (int column = 0; column < columns; ++column) {
+                rays.clear();
+                for (int k = 0; k < b * b; ++k) {
+                    const int i = column * b + k % b - half_u, j = int(row) * b + k / b - half_v;
+                    const Vec2 q = u * float(i) + v * float(j);
+                    if (glm::dot(q, q) > radius_ * radius_) continue;
+                    Ray ray;
+                    ray.direction = -to_viewer;
+                    ray.origin = object_from_view * Vec3(q, kEyeDistance * radius_);
+                    ray.t_min = (kEyeDistance - 1.01f) * radius_;
+                    rays.push_back(ray);
+                }
+                if (rays.empty()) continue;
+                hits.resize(rays.size());
+                const float footprint = pixel * std::sqrt(2.0f) / (kEyeDistance * radius_);
+                caster_.cast(rays.data(), rays.size(), hits.data(), footprint);
+                const size_t before = of_row[row].size();
+                for (size_t k = 0; k < rays.size(); ++k) {
+                    if (!(hits[k].t < kInfinity)) continue;
+                    Sample s;
+                    s.position = rays[k].origin + rays[k].direction * hits[k].t;
+                    s.normal = hits[k].normal_world;
+                    s.albedo = hits[k].albedo;
+                    s.facing = std::abs(glm::dot(s.normal, to_viewer));
+                    s.finish = finishOf(hits[k]);
+                    of_row[row].push_back(s);
+                }
+                if (of_row[row].size() > before) begin_of_row[row].push_back(uint32_t(before));
+                rays_cast_ += rays.size();
+            }
+        });
+        for (size_t row = 0; row < of_row.size(); ++row) {
+            const uint32_t offset = uint32_t(samples.size());
+            for (const uint32_t begin : begin_of_row[row]) block_begin.push_back(offset + begin);
+            samples.insert(samples.end(), of_row[row].begin(), of_row[row].end());
+        }
+        block_begin.push_back(uint32_t(samples.size()));
+        report.samples_hit += samples.size();
+        report.rays = rays_cast_;
+    }
+
+    // One of at most 256: material, and what its textures made of it, coarsely.
+    uint8_t finishOf(const RayHit& hit) {
+        const auto level = [](float v, int n) {
+            return int(std::lround(std::clamp(v, 0.0f, 1.0f) * float(n)));
+        };
+        const int metallic = level(hit.finish.metallic, 2),
+                  roughness = level(hit.finish.roughness, 4);
+        const uint64_t key =
+            uint64_t(hit.material) << 16 | uint64_t(metallic) << 8 | uint64_t(roughness);
+        const std::lock_guard lock(mutex_);
+        const auto found = finish_of_.find(key);
+        if (found != finish_of_.end()) return found->second;
+        if (finishes.size() == 256) {
+            for (const auto& [other, index] : finish_of_) {
+                if (other >> 16 == hit.material) return index;
+            }
+            return 255;
+        }
+        const Material& material = materials_[hit.material];
+        SurfelFinish finish;
+        finish.material.name = material.name;
+        finish.material.double_sided = material.double_sided;
+        finish.material.translucency = material.translucency;
+        finish.material.unlit = material.unlit;
+        finish.material.metallic = hit.finish.metallic;
+        finish.material.roughness = hit.finish.roughness;
+        finish.material.specular = hit.finish.specular;
+        finish.material.specular_weight = hit.finish.specular_edge;
+        finish.material.emissive = hit.finish.emissive;
+        finish.patch_width = patch_width_[hit.material];
+        finishes.push_back(finish);
+        return finish_of_[key] = uint8_t(finishes.size() - 1);
+    }
+
+    // Adds the view's blocks that what was chosen does not make up for.
+    void choose(const Vec3& to_viewer, float pixel, const std::vector<Sample>& samples,
+                const std::vector<uint32_t>& block_begin, float least_facing,
+                std::vector<Sample>& chosen) {
+        std::vector<std::vector<uint8_t>> missing(kTests);
+        pool_.forEach(kTests, [&](size_t test, int) {
+            throwIfAsked();
+            Picture picture = testPicture(to_viewer, int(test), pixel, radius_);
+            for (const Sample& s : chosen) picture.draw(s.position);
+            std::vector<uint8_t>& of_block = missing[test];
+            of_block.assign(block_begin.size() - 1, 0);
+            for (size_t b = 0; b + 1 < block_begin.size(); ++b) {
+                for (uint32_t i = block_begin[b]; i < block_begin[b + 1] && !of_block[b]; ++i) {
+                    if (samples[i].facing >= least_facing)
+                        of_block[b] = !picture.covers(samples[i].position);
+                }
+            }
+        });
+        for (size_t b = 0; b + 1 < block_begin.size(); ++b) {
+            const bool is_missing = std::any_of(missing.begin(), missing.end(),
+                                                [&](const auto& of_block) { return of_block[b]; });
+            if (!is_missing) continue;
+            for (uint32_t i = block_begin[b]; i < block_begin[b + 1]; ++i) {
+                if (samples[i].facing >= least_facing) chosen.push_back(samples[i]);
+            }
+        }
+    }
+
+    // Leaves out samples without which every pixel of every test still shows its surface, those at
+    // the worst angles first.
+    void removeNeedless(float pixel, std::vector<Sample>& chosen) {
+        const int n = options_.directions;
+        const size_t n_pictures = size_t(n) * kTests;
+        std::vector<std::vector<uint8_t>> counts(n_pictures);  // of samples that a pixel shows
+        std::vector<std::unique_ptr<Picture>> pictures(n_pictures);
+        pool_.forEach(n_pictures, [&](size_t k, int) {
+            throwIfAsked();
+            auto picture = std::make_unique<Picture>(
+                testPicture(projectionOf(int(k) / kTests, n), int(k) % kTests, pixel, radius_));
+            for (const Sample& s : chosen) picture->draw(s.position);
+            counts[k].assign(picture->pixels(), 0);
+            size_t i;
+            for (const Sample& s : chosen) {
+                if (picture->shows(s.position, i) && counts[k][i] < 255) ++counts[k][i];
+            }
+            pictures[k] = std::move(picture);
+        });
+        std::vector<uint32_t> order(chosen.size());
+        for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+        std::stable_sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+            return chosen[a].facing < chosen[b].facing;
+        });
+        std::vector<uint8_t> is_removed(chosen.size(), 0);
+        std::vector<std::pair<uint32_t, uint32_t>> shown;
+        for (size_t o = 0; o < order.size(); ++o) {
+            if (o % 4096 == 0) throwIfAsked();
+            const Sample& s = chosen[order[o]];
+            shown.clear();
+            bool is_needed = false;
+            for (size_t k = 0; k < n_pictures && !is_needed; ++k) {
+                size_t i;
+                if (!pictures[k]->shows(s.position, i)) continue;
+                is_needed = counts[k][i] <= 1 || counts[k][i] == 255;
+                shown.emplace_back(uint32_t(k), uint32_t(i));
+            }
+            if (is_needed) continue;
+            is_removed[order[o]] = 1;
+            for (const auto& [k, i] : shown) --counts[k][i];
+        }
+        size_t kept = 0;
+        for (size_t i = 0; i < chosen.size(); ++i) {
+            if (!is_removed[i]) chosen[kept++] = chosen[i];
+        }
+        chosen.resize(kept);
+    }
+
+    const RayCaster& caster_;
+    const std::vector<Material>& materials_;
+    const std::vector<float>& patch_width_;
+    const float radius_;
+    const PointBlockOptions& options_;
+    ThreadPool& pool_;
+    const CancelFlag& cancel_;
+    std::mutex mutex_;
+    std::map<uint64_t, uint8_t> finish_of_;
+    std::atomic<uint64_t> rays_cast_{0};
+};
+
+}  // namespace
+
+SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material>& materials,
+                             const std::vector<float>& patch_width, const DBox3& bounds,
+                             double area, const PointBlockOptions& options, ThreadPool& pool,
+                             const CancelFlag& cancel,
+                             const std::function<void(double fraction)>& progress,
+                             PointBlockReport& report) {
+    const Stopwatch watch;
+    const DVec3 center = 0.5 * (bounds.min + bounds.max);
+    const double radius = 0.5 * glm::length(bounds.max - bounds.min);
+    if (bounds.isEmpty() || !(radius > 0.0))
+        throw Error(ErrorCode::kInvalidArgument, "", "there is nothing to build a model of");
+    Builder builder(caster, materials, patch_width, radius, options, pool, cancel);
+    SurfelModel model;
+    model.kind = "point-blocks";
+    model.bounds = enclosingFloatBox(bounds);
+    model.area = area;
+    constexpr int kCoarsest = 8;  // pixels along the sphere
+    double done = 0.0, share = 0.7;
+    for (int resolution = options.resolution; resolution >= kCoarsest; resolution /= 2) {
+        const float pixel = float(2.0 * radius / resolution);
+        const std::vector<Sample> samples =
+            builder.build(pixel, [&](double fraction) { progress(done + share * fraction); });
+        done += share;
+        share *= 0.3;
+        if (samples.empty()) break;
+        std::vector<Surfel> surfels;
+        for (const Sample& s : samples) {
+            surfels.push_back({s.position, s.normal, s.albedo, s.finish, 1.0f});
+        }
+        SurfelLevel level = packSurfels(std::move(surfels), builder.finishes, pixel, false);
+        builder.findMasks(pixel, level);
+        // From about the centre to where the source is.
+        for (SurfelBlock& block : level.blocks) {
+            block.bounds.min += Vec3(center);
+            block.bounds.max += Vec3(center);
+            block.cone_apex += Vec3(center);
+        }
+        if (model.levels.empty()) {
+            builder.report.samples_kept = level.size();
+            if (area > 0.0)
+                builder.report.per_pixel =
+                    double(level.size()) * double(pixel) * double(pixel) / area;
+        }
+        model.levels.push_back(std::move(level));
+    }
+    if (model.levels.empty())
+        throw Error(ErrorCode::kInvalidArgument, "", "no ray hits anything: is it too fine?");
+    model.finishes = builder.finishes;
+    report = builder.report;
+    report.seconds = watch.seconds();
+    return model;
+}
+
+}  // namespace stipple

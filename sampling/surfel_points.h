@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Draws prebuilt models: blocks that may be seen, at the density that the view asks for; where the
+// finest is too coarse, discs in place of points. Based on: Grossman. Point Sample Rendering. 1998,
+// chapters 6 (visibility masks and cones) and 7 (warping).
+#pragma once
+
+#include <sampling/tile_context.h>
+
+namespace stipple {
+
+class SurfelPoints {
+public:
+    explicit SurfelPoints(TileContext& context) : context_(context) {}
+
+    // Draws an instance of a mesh that has surfels. z_min: of its nearest point, camera space.
+    // False, and nothing drawn, if it is so far that the mesh that stands for it is as good.
+    // Blocks are left out that lie outside of the sink's region, behind what it shows, or that show
+    // their back only. Cost: O(blocks of the level) and what is drawn.
+    bool draw(uint32_t mesh, const InstanceFrame& frame, float z_min);
+
+private:
+    struct Placed;
+
+    bool isHiddenFromEye(const InstanceFrame& frame, const SurfelModel& model,
+                         const SurfelBlock& block) const;
+    void drawPoints(const Placed& placed, const SurfelBlock& block);
+    void drawDiscs(const Placed& placed, const SurfelBlock& block);
+    uint32_t addRun(const Placed& placed, uint32_t first, bool is_disc);
+
+    TileContext& context_;
+    PointBlock block_;
+    TriangleBlock triangles_;
+};
+
+// Attributes of a surfel of a run (Run::surfel_level).
+void surfelAttributes(const Scene& scene, const View& view, const Run& run, uint32_t index,
+                      SurfaceSample& sample);
+
+}  // namespace stipple

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// Model files (*.stipple): versioned, with a checksum; docs/formats.md has the layout.
+#pragma once
+
+#include <scenegraph/io/load_context.h>
+#include <scenegraph/surfel_model.h>
+
+namespace stipple {
+
+// The whole file, little-endian. The same model gives the same bytes.
+std::string surfelFileText(const SurfelModel& model);
+
+// Throws kParse for anything that is no such file, whole and undamaged; kUnsupported for a newer
+// version; kOutOfMemory. where: names the file.
+SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
+                            const std::string& where);
+
+// The model as an asset: drawn by its surfels where they are needed, and far away, by rays and by
+// the z-buffer by a mesh of squares that stand for them. Throws as above.
+ChildRef loadSurfelModel(const std::filesystem::path& path, const std::string& name, Scene& scene,
+                         LoadContext& context);
+
+}  // namespace stipple

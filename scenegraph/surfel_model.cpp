@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <scenegraph/surfel_model.h>
+
+#include <core/error.h>
+#include <core/image.h>
+#include <scenegraph/morton.h>
+#include <scenegraph/visible_area.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace stipple {
+
+namespace {
+
+constexpr int kPerDirection = kMaskDirections / kDirections;
+
+// Corners of the spherical triangle of a direction of visible_area.h.
+std::array<Vec3, 3> triangleOf(int index) {
+    Vec3 axis[3] = {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+    for (int a = 0; a < 3; ++a) {
+        if (index >> (2 + a) & 1) axis[a] = -axis[a];
+    }
+    const auto middle = [](const Vec3& a, const Vec3& b) { return glm::normalize(a + b); };
+    const Vec3 xy = middle(axis[0], axis[1]), yz = middle(axis[1], axis[2]),
+               zx = middle(axis[2], axis[0]);
+    switch (index % 4) {
+        case 0:
+            return {axis[0], xy, zx};
+        case 1:
+            return {axis[1], yz, xy};
+        case 2:
+            return {axis[2], zx, yz};
+        default:
+            return {xy, yz, zx};
+    }
+}
+
+struct MaskTable {
+    std::array<Vec3, kMaskDirections> middles;
+    MaskTable() {
+        for (int d = 0; d < kDirections; ++d) {
+            const std::array<Vec3, 3> t = triangleOf(d);
+            const Vec3 ab = glm::normalize(t[0] + t[1]), bc = glm::normalize(t[1] + t[2]),
+                       ca = glm::normalize(t[2] + t[0]);
+            const Vec3 parts[kPerDirection] = {
+                glm::normalize(t[0] + ab + ca), glm::normalize(t[1] + bc + ab),
+                glm::normalize(t[2] + ca + bc), glm::normalize(ab + bc + ca)};
+            for (int k = 0; k < kPerDirection; ++k)
+                middles[size_t(d * kPerDirection + k)] = parts[k];
+        }
+    }
+};
+
+const MaskTable& maskTable() {
+    static const MaskTable table;
+    return table;
+}
+
+}  // namespace
+
+uint8_t surfelRadiusCode(float share) {
+    const float code = 128.0f + 8.0f * std::log2(std::max(share, 1e-6f));
+    return uint8_t(std::clamp(std::ceil(code), 1.0f, 255.0f));  // never smaller than asked for
+}
+
+Vec3 maskDirectionOf(int index) { return maskTable().middles[size_t(index)]; }
+
+int maskDirectionIndex(const Vec3& direction) {
+    const int first = directionIndex(direction) * kPerDirection;
+    int best = first;
+    float most = -kInfinity;
+    for (int i = first; i < first + kPerDirection; ++i) {
+        const float dot = glm::dot(direction, maskTable().middles[size_t(i)]);
+        if (dot > most) most = dot, best = i;
+    }
+    return best;
+}
+
+uint16_t packNormal16(const Vec3& n) {
+    const float s = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+    Vec2 p = s > 0.0f ? Vec2(n.x, n.y) / s : Vec2(0.0f);
+    if (n.z < 0.0f) {
+        p = Vec2((1.0f - std::abs(p.y)) * (p.x >= 0.0f ? 1.0f : -1.0f),
+                 (1.0f - std::abs(p.x)) * (p.y >= 0.0f ? 1.0f : -1.0f));
+    }
+    const auto q = [](float v) { return uint16_t(std::lround((v * 0.5f + 0.5f) * 255.0f)); };
+    return uint16_t(q(p.x) | q(p.y) << 8);
+}
+
+Vec3 unpackNormal16(uint16_t packed) {
+    const float x = float(packed & 255) * (2.0f / 255.0f) - 1.0f,
+                y = float(packed >> 8) * (2.0f / 255.0f) - 1.0f;
+    Vec3 n(x, y, 1.0f - std::abs(x) - std::abs(y));
+    const float t = std::max(-n.z, 0.0f);
+    n.x += n.x >= 0.0f ? -t : t;
+    n.y += n.y >= 0.0f ? -t : t;
+    return glm::normalize(n);
+}
+
+size_t SurfelModel::bytes() const {
+    size_t sum = sizeof(SurfelModel) + finishes.size() * sizeof(SurfelFinish);
+    for (const SurfelLevel& level : levels) {
+        sum += level.blocks.size() * sizeof(SurfelBlock) + level.radius.size() +
+               level.size() * (2 * sizeof(uint32_t) + sizeof(uint16_t));
+    }
+    return sum;
+}
+
+namespace {
+
+// The visibility cone of points with these normals (PSR, section 6.3), a little wider than it
+// must be: normals may be interpolated ones.
+void makeCone(const std::vector<Surfel>& surfels, size_t begin, size_t end, SurfelBlock& block) {
+    constexpr float kSlack = 0.25f;  // radians
+    Vec3 axis(0.0f), mean(0.0f);
+    for (size_t i = begin; i < end; ++i) {
+        axis += surfels[i].normal;
+        mean += surfels[i].position / float(end - begin);
+    }
+    const float length = glm::length(axis);
+    if (length < 0.5f * float(end - begin)) return;
+    axis /= length;
+    float least = 1.0f;
+    for (size_t i = begin; i < end; ++i) least = std::min(least, glm::dot(axis, surfels[i].normal));
+    const float angle = std::acos(std::clamp(least, -1.0f, 1.0f)) + kSlack;
+    if (angle >= 1.5f) return;
+    float t = kInfinity;
+    for (size_t i = begin; i < end; ++i) {
+        const Surfel& s = surfels[i];
+        t = std::min(
+            t, glm::dot(s.position - mean, s.normal) / std::max(glm::dot(axis, s.normal), 0.1f));
+    }
+    block.cone_axis = axis;
+    block.cone_apex = mean + axis * (t - 0.05f * glm::length(block.bounds.extent()));
+    block.cone_sine = std::sin(angle);
+}
+
+}  // namespace
+
+namespace {
+
+uint64_t interleave(uint32_t x, uint32_t y, uint32_t z) {
+    return spreadBits(x) << 2 | spreadBits(y) << 1 | spreadBits(z);
+}
+
+}  // namespace
+
+SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
+                        float spacing, bool with_radii) {
+    SurfelLevel level;
+    level.spacing = spacing;
+    Box3 bounds;
+    for (const Surfel& s : surfels) bounds.extend(s.position);
+    // A block faces one of 32 ways; within, along a space-filling curve.
+    struct Key {
+        uint64_t key;
+        uint32_t index;
+    };
+    std::vector<Key> order(surfels.size());
+    const float side = std::max({bounds.extent().x, bounds.extent().y, bounds.extent().z, 1e-30f});
+    // Cells of about 8 x 8 surfels: what faces several ways there makes several blocks.
+    const float cell = std::max(8.0f * spacing, side / 1023.0f);
+    for (uint32_t i = 0; i < surfels.size(); ++i) {
+        const Vec3 q = (surfels[i].position - bounds.min) / cell;
+        const Vec3 f = (surfels[i].position - bounds.min) / cell * 64.0f;
+        const auto fine = [](float v) { return uint32_t(v) & 63u; };
+        const uint64_t coarse = interleave(uint32_t(q.x), uint32_t(q.y), uint32_t(q.z));
+        const uint64_t inner = interleave(fine(f.x), fine(f.y), fine(f.z));
+        const uint64_t facing = uint64_t(directionIndex(surfels[i].normal));
+        order[i] = {coarse << 23 | facing << 18 | inner, i};
+    }
+    std::sort(order.begin(), order.end(), [](const Key& a, const Key& b) {
+        return a.key != b.key ? a.key < b.key : a.index < b.index;
+    });
+    std::vector<Surfel> sorted(surfels.size());
+    for (size_t i = 0; i < order.size(); ++i) sorted[i] = surfels[order[i].index];
+    for (size_t begin = 0; begin < sorted.size();) {
+        size_t end = begin;
+        SurfelBlock block;
+        bool is_single_sided = true;
+        // A block goes on into the next cell or facing only while it is small.
+        const uint64_t group = order[begin].key >> 18, coarse = order[begin].key >> 23;
+        for (; end < sorted.size() && end - begin < size_t(kBlockSurfels); ++end) {
+            const bool is_elsewhere = order[end].key >> 23 != coarse,
+                       is_other = order[end].key >> 18 != group;
+            if ((is_elsewhere && end - begin >= kBlockSurfels / 2) ||
+                (is_other && end - begin >= kBlockSurfels * 3 / 4))
+                break;
+            block.bounds.extend(sorted[end].position);
+            is_single_sided =
+                is_single_sided && !finishes[sorted[end].finish].material.double_sided;
+        }
+        block.first = uint32_t(begin);
+        block.count = uint32_t(end - begin);
+        if (is_single_sided) makeCone(sorted, begin, end, block);
+        const Vec3 extent = block.bounds.extent();
+        for (size_t i = begin; i < end; ++i) {
+            const Surfel& s = sorted[i];
+            uint32_t position = 0;
+            for (int a = 0; a < 3; ++a) {
+                const float q =
+                    extent[a] > 0.0f ? (s.position[a] - block.bounds.min[a]) / extent[a] : 0.0f;
+                const float steps = float(positionSteps(a));
+                position |= uint32_t(std::clamp(q, 0.0f, 1.0f) * steps + 0.5f) << kPositionShift[a];
+            }
+            level.position.push_back(position);
+            level.normal.push_back(packNormal16(s.normal));
+            const auto to8 = [](float v) {
+                return uint32_t(srgbFromLinear(std::clamp(v, 0.0f, 1.0f)) * 255.0f + 0.5f);
+            };
+            level.albedo_finish.push_back(to8(s.albedo.x) | to8(s.albedo.y) << 8 |
+                                          to8(s.albedo.z) << 16 | uint32_t(s.finish) << 24);
+            if (with_radii) level.radius.push_back(surfelRadiusCode(s.radius_share));
+        }
+        level.blocks.push_back(block);
+        begin = end;
+    }
+    return level;
+}
+
+Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t i) {
+    Surfel s;
+    const uint32_t q = level.position[i];
+    s.position =
+        block.bounds.min +
+        SurfelLevel::step(block) * Vec3(positionPart(q, 0), positionPart(q, 1), positionPart(q, 2));
+    s.normal = unpackNormal16(level.normal[i]);
+    const uint32_t bits = level.albedo_finish[i];
+    const auto from8 = [](uint32_t v) { return linearFromSrgb(float(v & 255) / 255.0f); };
+    s.albedo = Vec3(from8(bits), from8(bits >> 8), from8(bits >> 16));
+    s.finish = uint8_t(bits >> 24);
+    s.radius_share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[i]);
+    return s;
+}
+
+void checkSurfelModel(const SurfelModel& model, const std::string& where) {
+    const auto check = [&](bool condition, const char* what) {
+        if (!condition) throw Error(ErrorCode::kParse, where, what);
+    };
+    const auto isSane = [](const Vec3& v) {
+        constexpr float kMost = 1e15f;
+        return std::abs(v.x) < kMost && std::abs(v.y) < kMost && std::abs(v.z) < kMost;
+    };
+    check(model.kind == "point-blocks" || model.kind == "splats", "is a model of an unknown kind");
+    check(!model.levels.empty(), "holds no surfels");
+    check(!model.finishes.empty() && model.finishes.size() <= 256, "needs 1 to 256 finishes");
+    check(!model.bounds.isEmpty() && isSane(model.bounds.min) && isSane(model.bounds.max),
+          "has bounds that are no box");
+    check(model.area >= 0.0 && model.area < 1e30, "has an area that is no number");
+    for (const SurfelFinish& finish : model.finishes) {
+        const Material& m = finish.material;
+        const float values[] = {m.alpha,           m.metallic,     m.roughness,
+                                m.specular.x,      m.specular.y,   m.specular.z,
+                                m.emissive.x,      m.emissive.y,   m.emissive.z,
+                                m.specular_weight, m.translucency, finish.patch_width};
+        for (const float v : values)
+            check(v >= 0.0f && v < 1e15f, "has a finish that is no number");
+    }
+    for (const SurfelLevel& level : model.levels) {
+        const size_t n = level.size();
+        check(level.normal.size() == n && level.albedo_finish.size() == n &&
+                  (level.radius.empty() || level.radius.size() == n),
+              "has arrays of different lengths");
+        check(n > 0, "has a level without surfels");
+        check(level.spacing > 0.0f && level.spacing < 1e15f, "has a spacing that is no length");
+        uint64_t next = 0;
+        for (const SurfelBlock& block : level.blocks) {
+            check(block.first == next && block.count >= 1 && block.count <= uint32_t(kBlockSurfels),
+                  "has blocks that do not follow each other");
+            next += block.count;
+            check(!block.bounds.isEmpty() && isSane(block.bounds.min) && isSane(block.bounds.max),
+                  "has a block whose bounds are no box");
+            check(isSane(block.cone_apex) && isSane(block.cone_axis) &&
+                      std::abs(block.cone_sine) < 1e15f,
+                  "has a block whose cone is no cone");
+        }
+        check(next == n, "has surfels that belong to no block");
+        for (const uint32_t bits : level.albedo_finish)
+            check((bits >> 24) < model.finishes.size(), "has a surfel without a finish");
+    }
+}
+
+}  // namespace stipple

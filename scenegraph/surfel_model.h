@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+// Prebuilt models: surfels in blocks, at several densities, with what must be known of a block to
+// leave it out. Made by sampling/point_blocks.h and sampling/splats.h, read and written by
+// io/surfel_file.h, drawn by sampling/surfel_points.h. Based on: Grossman. Point Sample Rendering.
+// 1998, chapters 5 and 6; Pfister, Zwicker, van Baar, Gross. Surfels. 2000.
+#pragma once
+
+#include <core/material.h>
+#include <core/math.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace stipple {
+
+inline constexpr int kBlockSurfels = 64;  // most of a block
+
+// Up to 64 surfels that lie near each other and face about the same way.
+struct SurfelBlock {
+    Box3 bounds;         // object space; positions are quantized to it
+    uint32_t first = 0;  // its surfels are [first, first + count) of the level
+    uint32_t count = 0;
+    std::array<uint64_t, 2> visible_from = {~0ull,
+                                            ~0ull};  // bit per kMaskDirections: seen from there
+    // Visibility cone: nothing of the block is seen from x where dot(x - apex, axis) is below
+    // -sine * |x - apex|. sine above 1: no such place.
+    Vec3 cone_apex = Vec3(0), cone_axis = Vec3(0, 0, 1);
+    float cone_sine = 2.0f;
+};
+
+// Positions within a block: 11, 11 and 10 bits.
+inline constexpr int kPositionBits[3] = {11, 11, 10};
+inline constexpr int kPositionShift[3] = {0, 11, 22};
+inline constexpr uint32_t positionSteps(int axis) { return (1u << kPositionBits[axis]) - 1u; }
+inline uint32_t positionPart(uint32_t packed, int axis) {
+    return packed >> kPositionShift[axis] & positionSteps(axis);
+}
+
+// One density: as structure of arrays, 10 bytes a surfel, 11 with radii of their own.
+struct SurfelLevel {
+    float spacing = 1.0f;  // object space, m: no point of the surface is farther from a surfel
+    std::vector<SurfelBlock> blocks;
+    std::vector<uint32_t> position;  // packed, in steps of the block's extent
+    std::vector<uint16_t> normal;    // octahedral, 2 x 8 bits
+    std::vector<uint32_t>
+        albedo_finish;            // sRGB-encoded 3 x 8 bits; index of the finish in the top 8
+    std::vector<uint8_t> radius;  // surfelRadius() codes; empty: spacing holds for all
+
+    size_t size() const { return position.size(); }
+    static Vec3 step(const SurfelBlock& block) {
+        return block.bounds.extent() / Vec3(positionSteps(0), positionSteps(1), positionSteps(2));
+    }
+};
+
+// Radii in eighths of an octave, as a share of SurfelLevel::spacing.
+inline float surfelRadius(uint8_t code) { return std::exp2((float(code) - 128.0f) * 0.125f); }
+uint8_t surfelRadiusCode(float share);
+
+// What surfels of one kind share beside their colour.
+struct SurfelFinish {
+    Material material;         // without textures; base_color is not used
+    float patch_width = 1.0f;  // of what they lie on (a leaf, a whole surface), m
+};
+
+struct SurfelModel {
+    std::string kind;                    // "point-blocks", "splats"
+    std::string source;                  // name of the file it was made from
+    Box3 bounds;                         // of its source, exact
+    double area = 0.0;                   // of its source's surface, m^2
+    std::vector<SurfelFinish> finishes;  // at most 256
+    std::vector<SurfelLevel> levels;     // finest first, each about twice the spacing of the last
+
+    size_t bytes() const;
+};
+
+// Directions that visible_from has bits for: the octants of the sphere, each split in four, each of
+// these in four again.
+inline constexpr int kMaskDirections = 128;
+int maskDirectionIndex(const Vec3& direction);  // not null, any length
+Vec3 maskDirectionOf(int index);                // unit; about the middle
+
+uint16_t packNormal16(const Vec3& unit);
+Vec3 unpackNormal16(uint16_t packed);
+
+// What is packed into a level.
+struct Surfel {
+    Vec3 position = Vec3(0), normal = Vec3(0, 0, 1), albedo = Vec3(0);  // albedo linear
+    uint8_t finish = 0;
+    float radius_share = 1.0f;  // of the level's spacing
+};
+
+// Sorts surfels into blocks of what lies near each other and faces one way, with visibility cones
+// where all finishes of a block are single-sided. with_radii: keep radius_share.
+SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
+                        float spacing, bool with_radii);
+Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t index);
+
+// Throws kParse (where: names the file) unless blocks, counts, numbers and finishes make sense.
+void checkSurfelModel(const SurfelModel& model, const std::string& where);
+
+}  // namespace stipple
