@@ -70,10 +70,12 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         placed.width_codes[i] =
             int(patchWidthCode(model.finishes[i].patch_width * scale, kFirstMetreExponent));
     }
+    const bool with_surfels = context_.sink->wantsSurfels();
     const bool with_discs =
-        level.spacing * per_metre > std::max(1.0f, wanted) && !context_.sink->wantsSurfels();
+        level.spacing * per_metre > std::max(with_surfels ? kFewSubpixels : 1.0f, wanted);
     // Discs seen edge on cover no subpixel: their middles do.
-    const bool with_points = !with_discs || level.spacing * per_metre < kFewSubpixels;
+    const bool with_points =
+        !with_discs || with_surfels || level.spacing * per_metre < kFewSubpixels;
     const float reach = float(maxLengthScale(frame.camera_from_object.linear));
     const SubpixelRect& region = context_.sink->region();
     for (const SurfelBlock& block : level.blocks) {
@@ -152,26 +154,35 @@ void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
     }
     const uint32_t number = addRun(placed, b.first, false);
     for (int i = 0; i < n; ++i) out.number[i] = number + uint32_t(i);
-    const Vec3 center(to_camera.point(DVec3(b.bounds.center())));
+    if (context_.sink->wantsSurfels()) {
+        addShapes(placed, b);
+    } else {
+        // There are enough of them to leave no holes: none need be wider than its subpixel.
+        std::fill(out.width, out.width + n, kNoPatch);
+    }
+    if (!context_.sink->take(out)) context_.runs.pop_back();
+}
+
+// Patch widths, normals and areas of the block that was just made.
+void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
+    const SurfelLevel& level = placed.level;
+    const View& view = context_.view;
+    const Vec3 center(placed.frame.camera_from_object.point(DVec3(b.bounds.center())));
     const float z = view.orthographic ? 1.0f : std::max(center.z, view.near_z);
     const int offset = int(std::lround(std::log2(float(view.focal) / z) * kWidthsPerOctave)) +
                        (kFirstMetreExponent - kFirstSubpixelExponent) * kWidthsPerOctave;
-    for (int i = 0; i < n; ++i) {
-        const int code = placed.width_codes[level.albedo_finish[b.first + uint32_t(i)] >> 24];
+    const float side = level.spacing * placed.length_scale;
+    PointBlock& out = block_;
+    for (int i = 0; i < out.count; ++i) {
+        const uint32_t k = b.first + uint32_t(i);
+        const int code = placed.width_codes[level.albedo_finish[k] >> 24];
         out.width[i] = uint8_t(std::clamp(code + offset, 1, kWidthCodes - 1));
+        const Vec3 normal =
+            glm::normalize(placed.frame.camera_from_normal * unpackNormal16(level.normal[k]));
+        out.normal_x[i] = normal.x, out.normal_y[i] = normal.y, out.normal_z[i] = normal.z;
+        const float share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[k]);
+        out.area[i] = side * side * share * share;
     }
-    if (context_.sink->wantsSurfels()) {
-        const float side = level.spacing * placed.length_scale;
-        for (int i = 0; i < n; ++i) {
-            const uint32_t k = b.first + uint32_t(i);
-            const Vec3 normal =
-                glm::normalize(placed.frame.camera_from_normal * unpackNormal16(level.normal[k]));
-            out.normal_x[i] = normal.x, out.normal_y[i] = normal.y, out.normal_z[i] = normal.z;
-            const float share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[k]);
-            out.area[i] = side * side * share * share;
-        }
-    }
-    if (!context_.sink->take(out)) context_.runs.pop_back();
 }
 
 // Squares that stand for discs, two triangles each.

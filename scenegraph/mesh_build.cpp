@@ -364,6 +364,11 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
     }
     mesh.area = mesh.cumulative_area.back();
     OctreeBuilder(mesh, codes).build();
+    if (mesh.surfels) {
+        // What stands for the model lies within.
+        mesh.bounds = mesh.surfels->bounds;
+        mesh.nodes[0].bounds = mesh.bounds;
+    }
 }
 
 size_t Mesh::bytes() const {

@@ -230,7 +230,9 @@ Mesh standInMesh(const SurfelModel& model) {
                        b = glm::cross(s.normal, a);
             const uint32_t first = uint32_t(mesh.positions.size());
             for (const Vec3& corner : {-a - b, a - b, a + b, b - a}) {
-                mesh.positions.push_back(s.position + corner);
+                // Within the source's bounds: both are looked at from the same default camera.
+                mesh.positions.push_back(
+                    glm::clamp(s.position + corner, model.bounds.min, model.bounds.max));
                 mesh.normals.push_back(s.normal);
                 mesh.colors.emplace_back(s.albedo, 1.0f);
             }

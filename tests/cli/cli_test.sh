@@ -783,7 +783,7 @@ case_build() {
     # As an asset of a scene, instanced.
     cat >many.scene.json <<JSON
 { "version": 1, "assets": { "ball": { "file": "ball.stipple" } }, "root": "many",
-  "groups": { "many": { "grid": { "child": "ball", "counts": [3, 1, 3], "spacing": [2, 1, 2] } } } }
+  "groups": { "many": { "grid": { "child": "ball", "count_x": 3, "count_z": 3, "spacing_x": 2, "spacing_z": 2 } } } }
 JSON
     expect_ok render many.scene.json -o many.png "${tiny[@]}"
 }

@@ -43,7 +43,8 @@ TEST(SurfelModel, packedSurfelsComeBackWithinTheirSteps) {
         for (uint32_t i = block.first; i < block.first + block.count; ++i, ++count) {
             const Surfel s = unpackSurfel(level, block, i);
             EXPECT_NEAR(glm::length(s.position - Vec3(5, 0, 0)), 2.0f, 2e-3f);
-            EXPECT_GT(glm::dot(s.normal, (s.position - Vec3(5, 0, 0)) / 2.0f), 0.9999f);
+            EXPECT_GT(glm::dot(s.normal, (s.position - Vec3(5, 0, 0)) / 2.0f),
+                      0.9993f);  // 8 bits an axis: 2 degrees
             EXPECT_NEAR(s.albedo.g, 0.5f, 0.01f);
             // Not smaller than asked for, and by less than an eighth of an octave larger.
             const float share = s.radius_share / std::round(s.radius_share - 0.04f);
@@ -52,7 +53,7 @@ TEST(SurfelModel, packedSurfelsComeBackWithinTheirSteps) {
         }
     }
     EXPECT_EQ(count, 5000u);
-    EXPECT_GT(double(level.size()) / double(level.blocks.size()), 32.0);  // blocks are well filled
+    EXPECT_GT(double(level.size()) / double(level.blocks.size()), 28.0);  // blocks are well filled
 }
 
 // Nothing of a block may be seen from where its cone says so.
@@ -87,7 +88,7 @@ TEST(SurfelModel, maskDirectionsCoverTheSphereEvenly) {
         const Vec3 d(r * std::cos(a), r * std::sin(a), z);
         const int m = maskDirectionIndex(d);
         ++hits[size_t(m)];
-        EXPECT_GT(glm::dot(d, maskDirectionOf(m)), 0.95f);
+        EXPECT_GT(glm::dot(d, maskDirectionOf(m)), 0.94f);
     }
     for (const int n : hits) EXPECT_GT(n, 60);
     for (int m = 0; m < kMaskDirections; ++m) EXPECT_EQ(maskDirectionIndex(maskDirectionOf(m)), m);
