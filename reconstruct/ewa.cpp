@@ -135,6 +135,7 @@ private:
     // What a point stands for, m^2: no more than on a plane that is turned to the eye enough to be
     // drawn.
     float areaOf(const PointBlock& block, int i, const Ellipse& e) const {
+        if (block.is_prebuilt) return block.area[i];
         const float projected =
             e.unit.determinant() > 0.0f ? std::sqrt(e.unit.determinant()) : 1.0f;
         return std::min(block.area[i], most_projected_ / projected);

@@ -61,7 +61,7 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         scale * float(view.focal) / (view.orthographic ? 1.0f : std::max(z_min, view.near_z));
     const float wanted = 1.0f / float(std::sqrt(context_.settings.samples));
     const int n_levels = int(model.levels.size());
-    if (n_levels > 1 && model.levels.back().spacing * per_metre < kFarShare * wanted) return false;
+    if (model.levels.back().spacing * per_metre < kFarShare * wanted) return false;
     int l = n_levels - 1;
     while (l > 0 && model.levels[size_t(l)].spacing * per_metre > wanted) --l;
     const SurfelLevel& level = model.levels[size_t(l)];
@@ -70,12 +70,10 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         placed.width_codes[i] =
             int(patchWidthCode(model.finishes[i].patch_width * scale, kFirstMetreExponent));
     }
-    const bool with_surfels = context_.sink->wantsSurfels();
     const bool with_discs =
-        level.spacing * per_metre > std::max(with_surfels ? kFewSubpixels : 1.0f, wanted);
+        !context_.sink->wantsSurfels() && level.spacing * per_metre > std::max(1.0f, wanted);
     // Discs seen edge on cover no subpixel: their middles do.
-    const bool with_points =
-        !with_discs || with_surfels || level.spacing * per_metre < kFewSubpixels;
+    const bool with_points = !with_discs || level.spacing * per_metre < kFewSubpixels;
     const float reach = float(maxLengthScale(frame.camera_from_object.linear));
     const SubpixelRect& region = context_.sink->region();
     for (const SurfelBlock& block : level.blocks) {
@@ -142,6 +140,7 @@ void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
     const float z_near = view.near_z, z_far = view.far_z;
     PointBlock& out = block_;
     out.count = n;
+    out.is_prebuilt = true;
     for (int i = 0; i < n; ++i) {
         const float u = float(int(positionPart(packed[i], 0))),
                     v = float(int(positionPart(packed[i], 1))),
@@ -171,7 +170,8 @@ void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
     const float z = view.orthographic ? 1.0f : std::max(center.z, view.near_z);
     const int offset = int(std::lround(std::log2(float(view.focal) / z) * kWidthsPerOctave)) +
                        (kFirstMetreExponent - kFirstSubpixelExponent) * kWidthsPerOctave;
-    const float side = level.spacing * placed.length_scale;
+    // Discs with radii of their own cover all of the surface between them; what blends, less.
+    const float side = level.spacing * placed.length_scale * (level.radius.empty() ? 1.0f : 0.5f);
     PointBlock& out = block_;
     for (int i = 0; i < out.count; ++i) {
         const uint32_t k = b.first + uint32_t(i);

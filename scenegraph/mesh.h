@@ -57,6 +57,8 @@ struct Mesh {
     std::vector<UVec3> triangles;             // counter-clockwise seen from the front
     std::vector<uint16_t> triangle_material;  // index into Scene::materials, one a triangle
 
+    bool is_cloud = false;  // positions are the corners of points' discs, four a point
+
     // A prebuilt model, which is drawn in place of the triangles where these would be too coarse;
     // its finishes are the scene's materials from first_finish on. Null for meshes.
     std::shared_ptr<const SurfelModel> surfels;

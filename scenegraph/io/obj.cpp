@@ -316,6 +316,7 @@ ChildRef loadObj(const std::filesystem::path& path, const std::string& name, Sce
         const PointDiscs discs =
             makePointDiscs(contents.positions, has_normals ? contents.normals : std::vector<Vec3>(),
                            context, where);
+        mesh.is_cloud = true;
         mesh.positions = discs.corners;
         mesh.triangles = discs.triangles;
         for (const Vec3& color : perCorner(discs, contents.colors))

@@ -380,6 +380,7 @@ void addPoints(PlyContents& contents, Mesh& mesh, const std::string& where, Load
         context.warnOnce(where, std::to_string(contents.positions.size() - discs.point.size()) +
                                     " points are left out: they are not finite");
     }
+    mesh.is_cloud = true;
     mesh.positions = discs.corners;
     mesh.triangles = discs.triangles;
     mesh.colors = perCorner(discs, contents.colors);

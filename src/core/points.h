@@ -90,6 +90,7 @@ struct PointBlock {
     alignas(64) float normal_y[kBlockPoints + kBlockPadding];
     alignas(64) float normal_z[kBlockPoints + kBlockPadding];
     alignas(64) float area[kBlockPoints + kBlockPadding];
+    bool is_prebuilt = false;  // areas are those of discs that close the surface, however dense
 };
 
 // Says whether a triangle of a block has surface at a subpixel (alpha masks).

@@ -790,6 +790,10 @@ JSON
 
 case_build_errors() {
     write_scene
+    expect_ok build scene.scene.json --as splats -o splats.stipple --set points=2000
+    expect_stdout '2000 points, [0-9]+ splats'
+    expect_ok render splats.stipple -o splats.png "${tiny[@]}" --reconstruct ewa
+    expect_error 2 'tolerance' build scene.scene.json --as splats -o a.stipple --set tolerance=0
     expect_error 2 "'voxels'" build scene.scene.json --as voxels -o a.stipple
     expect_error 2 'stipple' build scene.scene.json --as point-blocks -o a.png
     expect_error 2 'resolution' build scene.scene.json --as point-blocks -o a.stipple --set resolution=7

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Surface splats from point clouds: as few discs as cover all points within a tolerance, closed
+// over the gaps between the points. Based on: Wu, Kobbelt. Optimized Sub-Sampling of Point Sets for
+// Surface Splatting. 2004; Johnson. Point-based Graphics for Estimated Surfaces.
+#pragma once
+
+#include <core/parallel.h>
+#include <scenegraph/scene.h>
+
+#include <functional>
+#include <string>
+
+namespace stipple {
+
+struct SplatOptions {
+    double tolerance = 0.1;         // of points from their splat, per cent of the bounds' diagonal
+    double color_tolerance = 0.15;  // of points' colours from their splat's, 0..2 (sRGB, a channel)
+    int neighbours = 12;            // that a point's plane is fitted to
+    int points = 200000;            // taken on meshes; clouds are taken as they are
+    bool relax = true;              // leave splats out whose points others cover
+    bool naive = false;             // one splat a point, for comparison
+};
+
+// Sets one option from text, as `stipple build --set` has it. Throws kInvalidArgument.
+void applyOption(SplatOptions& options, const std::string& key, const std::string& value);
+
+struct SplatReport {
+    double seconds = 0.0;
+    uint64_t points = 0, splats = 0;
+    double largest_distance = 0.0, mean_distance = 0.0;  // of points from their splat, m
+    double tolerance = 0.0;                              // m
+};
+
+// Of all that the scene's root shows: clouds by their points (normals are kept where the file has
+// them, else estimated and turned the same way), meshes by points spread evenly over them. The same
+// model for any number of threads. progress may be called from any thread, one at a time. Throws
+// kInvalidScene if there are no points, kCancelled. O(n log n) for small tolerances.
+SurfelModel buildSplats(const Scene& scene, const SplatOptions& options, ThreadPool& pool,
+                        const CancelFlag& cancel,
+                        const std::function<void(double fraction)>& progress, SplatReport& report);
+
+}  // namespace stipple

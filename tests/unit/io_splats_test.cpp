@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+// Splats from point clouds: every point lies within the tolerance of a splat, there are far fewer
+// of them, they face outwards, and odd clouds are handled.
+#include <core/rng.h>
+#include <gtest/gtest.h>
+#include <scenegraph/io/load.h>
+#include <scenegraph/io/splats.h>
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace stipple {
+namespace {
+
+// A scene of the PLY cloud with these lines.
+Scene cloudScene(const std::vector<std::string>& lines, const char* properties) {
+    const std::string path = (std::filesystem::temp_directory_path() /
+                              ("stipple-cloud-" + std::to_string(getpid()) + ".ply"))
+                                 .string();
+    std::ofstream file(path);
+    file << "ply\nformat ascii 1.0\nelement vertex " << lines.size() << "\n"
+         << "property float x\nproperty float y\nproperty float z\n"
+         << properties << "end_header\n";
+    for (const std::string& line : lines) file << line << "\n";
+    file.close();
+    ThreadPool pool(2);
+    Diagnostics diagnostics;
+    Scene scene = loadScene(path, {true, 0, nullptr}, pool, diagnostics);
+    std::filesystem::remove(path);
+    return scene;
+}
+
+std::vector<std::string> spherePoints(int n) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < n; ++i) {
+        const double z = 1.0 - (2.0 * i + 1.0) / n, a = 2.399963 * i, r = std::sqrt(1 - z * z);
+        lines.push_back(std::to_string(r * std::cos(a)) + " " + std::to_string(z) + " " +
+                        std::to_string(r * std::sin(a)));
+    }
+    return lines;
+}
+
+SurfelModel build(const Scene& scene, const SplatOptions& options, SplatReport& report,
+                  int threads = 2) {
+    ThreadPool pool(threads);
+    const CancelFlag cancel;
+    return buildSplats(
+        scene, options, pool, cancel, [](double) {}, report);
+}
+
+TEST(Splats, coverASphereWithinTheToleranceAndFaceOutwards) {
+    const Scene scene = cloudScene(spherePoints(20000), "");
+    SplatOptions options;
+    SplatReport coarse, fine;
+    options.tolerance = 0.2;
+    const SurfelModel model = build(scene, options, coarse);
+    EXPECT_EQ(coarse.points, 20000u);
+    EXPECT_LE(coarse.largest_distance, coarse.tolerance * 1.0001);
+    EXPECT_LT(coarse.splats, 2000u);
+    options.tolerance = 0.05;
+    build(scene, options, fine);
+    EXPECT_GT(fine.splats, 2 * coarse.splats);
+    EXPECT_LE(fine.largest_distance, fine.tolerance * 1.0001);
+    const SurfelLevel& level = model.levels[0];
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            EXPECT_GT(glm::dot(s.normal, glm::normalize(s.position)), 0.97f);
+        }
+    }
+}
+
+TEST(Splats, sameForAnyThreads) {
+    const Scene scene = cloudScene(spherePoints(3000), "");
+    SplatReport a, b;
+    const SurfelModel one = build(scene, SplatOptions(), a, 1),
+                      three = build(scene, SplatOptions(), b, 3);
+    EXPECT_EQ(one.levels[0].position, three.levels[0].position);
+    EXPECT_EQ(one.levels[0].radius, three.levels[0].radius);
+}
+
+TEST(Splats, coloursAreKept) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < 100; ++i) {
+        for (int j = 0; j < 100; ++j)
+            lines.push_back(std::to_string(i * 0.01) + " 0 " + std::to_string(j * 0.01) +
+                            (i < 50 ? " 255 0 0" : " 0 0 255"));
+    }
+    const Scene scene =
+        cloudScene(lines, "property uchar red\nproperty uchar green\nproperty uchar blue\n");
+    SplatReport report;
+    const SurfelModel model = build(scene, SplatOptions(), report);
+    const SurfelLevel& level = model.levels[0];
+    EXPECT_LT(level.size(), 1000u);
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            EXPECT_GT(s.position.x < 0.495f ? s.albedo.r : s.albedo.b, 0.9f);
+        }
+    }
+}
+
+TEST(Splats, oddCloudsAreHandled) {
+    SplatReport report;
+    // On a line, all at one place, a single one, and a few.
+    std::vector<std::string> line, same;
+    for (int i = 0; i < 200; ++i) line.push_back(std::to_string(i) + " 0 0");
+    for (int i = 0; i < 200; ++i) same.push_back("1 2 3");
+    for (const auto& lines : {line, same, std::vector<std::string>{"1 2 3"},
+                              std::vector<std::string>{"0 0 0", "1 0 0", "0 0 1"}}) {
+        const SurfelModel model = build(cloudScene(lines, ""), SplatOptions(), report);
+        EXPECT_GE(model.levels[0].size(), 1u);
+        checkSurfelModel(model, "odd");
+    }
+    try {
+        build(cloudScene({"nan 0 0"}, ""), SplatOptions(), report);
+        ADD_FAILURE() << "a cloud without points was taken";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kInvalidScene);
+    }
+}
+
+}  // namespace
+}  // namespace stipple
