@@ -15,6 +15,7 @@
 #include <tools/stats_json.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <string_view>
@@ -31,6 +32,7 @@ struct RenderOptions {
     int frames = 0;  // of the path; 0: not given
     std::vector<std::string> aovs;
     bool transparent = false;
+    std::string progressive;
     int repeat = 1;
     uint64_t memory_limit_mb = 0;
     std::string debug_pixel;
@@ -86,6 +88,12 @@ void addOptions(CLI::App& app, RenderOptions& options) {
     app.add_flag("--transparent", options.transparent,
                  "leave the background out; alpha is coverage")
         ->group("Picture");
+    app.add_option(
+           "--progressive", options.progressive,
+           "also pictures of 1, 10, 50, 75 and 100 % of the samples, as they come; a pattern "
+           "such as OUT_%03d.png, numbered by the per cent")
+        ->type_name("PATTERN")
+        ->group("Picture");
     options.settings.addTo(app);
     app.add_option(
            "--repeat", options.repeat,
@@ -132,6 +140,10 @@ std::vector<std::string> outputNames(const RenderOptions& options) {
     return names;
 }
 
+// Per cent of the samples that --progressive shows. Points are prefixes of their lists, so each
+// picture holds the points of the one before.
+constexpr int kStages[] = {1, 10, 50, 75, 100};
+
 // --path and --frames belong together; what chooses one frame contradicts them.
 void checkPathOptions(const RenderOptions& options) {
     if (options.path.empty() != (options.frames == 0)) {
@@ -142,6 +154,7 @@ void checkPathOptions(const RenderOptions& options) {
     const char* other = !options.camera.empty()        ? "--camera"
                         : options.repeat > 1           ? "--repeat"
                         : !options.debug_pixel.empty() ? "--debug-pixel"
+                        : !options.progressive.empty() ? "--progressive"
                                                        : nullptr;
     if (other)
         throw Error(ErrorCode::kInvalidArgument, "--path", std::string("contradicts ") + other);
@@ -153,6 +166,11 @@ void checkOptions(const RenderOptions& options) {
     for (const std::string& name : outputNames(options))
         checkOutputFile("-o", name, {".png", ".exr"});
     if (!options.stats.empty()) checkOutputFile("--stats", options.stats, {});
+    for (const int stage : kStages) {
+        if (options.progressive.empty()) break;
+        checkOutputFile("--progressive", frameName("--progressive", options.progressive, stage),
+                        {".png", ".exr"});
+    }
     for (const std::string& aov : options.aovs) {
         if (std::find(kAovNames.begin(), kAovNames.end(), aov) != kAovNames.end()) continue;
         const std::string nearest = nearestName(aov, kAovNames);
@@ -197,6 +215,24 @@ std::vector<Camera> chooseCameras(const Scene& scene, const RenderOptions& optio
     for (int i = 0; i < options.frames; ++i)
         cameras.push_back(cameraAt(*path, i / std::max(options.frames - 1.0, 1.0)));
     return cameras;
+}
+
+// Few samples first: what is drawn by points; what other methods take is theirs.
+void drawStages(const RenderOptions& options, FrameRequest request, Renderer& renderer,
+                RunStats& stats) {
+    const double samples = request.settings.samples;
+    constexpr double kLeastSamples = 0.001;  // as the settings table has it
+    for (const int stage : kStages) {
+        request.settings.samples = std::max(kLeastSamples, samples * stage / 100.0);
+        if (request.settings.method == Method::kRaycast)
+            request.settings.samples = std::max(1.0, std::round(request.settings.samples));
+        Frame frame = renderer.render(request);
+        stats.frames.push_back(frame.stats);
+        const std::string name = frameName("--progressive", options.progressive, stage);
+        if (lowerExtension(name) == ".png") applyTone(request.settings.tone, frame.image);
+        saveImage(frame.image, name);
+        std::cout << name << std::endl;  // now: others may be waiting for it
+    }
 }
 
 // What an .exr says about how it was made. A .png says nothing, so that equal pictures are equal
@@ -269,6 +305,7 @@ ExitCode runRender(const std::vector<std::string>& arguments) {
     stats.build_seconds = build_watch.seconds();
     for (; done < outputs.size(); ++done) {
         request.camera = cameras[done];
+        if (!options.progressive.empty()) drawStages(options, request, renderer, stats);
         Frame frame;
         for (int i = 0; i < options.repeat; ++i) {
             frame = renderer.render(request);

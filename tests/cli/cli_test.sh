@@ -78,7 +78,7 @@ case_help() {
 
 # docs/cli.md names every option of every command, and no option that does not exist.
 case_help_names_every_option() {
-    for command in render info compare bench edit view generate; do "$stipple" help "$command"; done |
+    for command in render info compare bench edit view study build generate; do "$stipple" help "$command"; done |
         grep -oE -- '^  (-. )?--[a-z-]+' | grep -oE -- '--[a-z-]+' | sort -u >have.txt
     grep -oE -- '--[a-z][a-z-]*' "$repository/docs/cli.md" | sort -u >documented.txt
     [[ $(wc -l <have.txt) -gt 20 ]] || fail "cannot read the help"
@@ -771,6 +771,20 @@ out.writeheader(); out.writerows(rows)
 PY
     expect_ok study --compare one two
     expect_stdout 'points_drawn .* \+100.0 %'
+}
+
+case_progressive() {
+    write_scene
+    sed -i 's/"triangles": 500/"triangles": 20000/' scene.scene.json  # small enough for points
+    expect_ok render scene.scene.json -o last.png "${tiny[@]}" --progressive 'stage_%03d.png'
+    for stage in 001 010 050 075 100; do
+        [[ -s stage_$stage.png ]] || fail "no stage $stage"
+        expect_stdout "^stage_$stage\\.png\$"
+    done
+    cmp -s stage_100.png last.png || fail "the last stage is not the picture"
+    cmp -s stage_001.png stage_100.png && fail "one per cent is all of it"
+    expect_error 2 'progressive' render scene.scene.json -o a.png --progressive stage.png
+    expect_error 2 'progressive' render scene.scene.json -o a.png --progressive 'stage_%d.jpg'
 }
 
 case_build() {
