@@ -205,6 +205,10 @@ private:
     }
 
     void measureFrames(const StudyCase& one, int repetition, bool with_picture, StudyRow& row) {
+        // A row without numbers: there is nothing to measure.
+        if (one.settings.method == Method::kZBuffer &&
+            sceneSize(scene_.atLevel(one.nest)).triangles_total > kZBufferLimit)
+            return;
         // The reference first: it must not push out of the processor's caches what later frames
         // find there.
         const Image* reference = study_.reference_rays > 0 ? &referenceFor(one) : nullptr;
