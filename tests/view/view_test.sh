@@ -55,6 +55,7 @@ shot() {
     done
     fail "$* never came"
 }
+shot started.png  # only now it is sure to listen
 key h  # without the panel
 shot before.png
 # Plant on the floor, right of the middle.
