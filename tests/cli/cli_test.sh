@@ -773,6 +773,36 @@ PY
     expect_stdout 'points_drawn .* \+100.0 %'
 }
 
+# Groups of groups, edited at every level between frames: what is cached is what would be drawn anew.
+case_edit_nested_caches() {
+    cat >nest.scene.json <<JSON
+{ "version": 1, "root": "field",
+  "assets": { "oak": { "generate": "tree", "triangles": 2000 }, "ball": { "generate": "sphere" } },
+  "groups": {
+    "tile": { "grid": { "child": "oak", "count_x": 4, "count_z": 4, "spacing_x": 12, "spacing_z": 12 } },
+    "block": { "grid": { "child": "tile", "count_x": 4, "count_z": 4, "spacing_x": 48, "spacing_z": 48 } },
+    "field": { "grid": { "child": "block", "count_x": 4, "count_z": 4, "spacing_x": 192, "spacing_z": 192 } } },
+  "cameras": [ { "name": "far", "eye": [0, 3000, 3000], "target": [0, 0, 0], "fov": 20 } ] }
+JSON
+    cat >edits.jsonl <<'JSON'
+{"do":"render"}
+{"do":"insert","group":"tile","child":"ball","translation":[3,20,0],"scale":9}
+{"do":"render"}
+{"do":"remove","group":"block","index":5}
+{"do":"render"}
+{"do":"remove","group":"field","index":2}
+{"do":"insert","group":"block","child":"ball","translation":[30,40,0],"scale":40}
+{"do":"render"}
+JSON
+    for mb in 0 64; do
+        expect_ok edit nest.scene.json --script edits.jsonl -o "cache${mb}_%d.png" --width 96 --height 64 --cache-mb $mb
+    done
+    for i in 0 1 2 3; do
+        cmp -s cache0_$i.png cache64_$i.png || fail "picture $i is another with a cache"
+        [[ $i == 0 ]] || ! cmp -s cache64_$i.png cache64_$((i - 1)).png || fail "picture $i did not change"
+    done
+}
+
 case_progressive() {
     write_scene
     sed -i 's/"triangles": 500/"triangles": 20000/' scene.scene.json  # small enough for points
