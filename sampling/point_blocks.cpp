@@ -1,48 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sampling/point_blocks.h>
 
-#include <core/error.h>
+#include <core/option_text.h>
 #include <core/stopwatch.h>
 #include <scenegraph/visible_area.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 
 namespace stipple {
 
 void applyOption(PointBlockOptions& options, const std::string& key, const std::string& value) {
-    const auto refuse = [&](const std::string& values) {
-        throw Error(ErrorCode::kInvalidArgument, "--set",
-                    "'" + value + "' is not a value of " + key + " (" + values + ")");
-    };
-    const auto number = [&](double low, double high, const char* values) {
-        double v = 0.0;
-        const auto [rest, error] = std::from_chars(value.data(), value.data() + value.size(), v);
-        if (error != std::errc() || rest != value.data() + value.size() || !(v >= low && v <= high))
-            refuse(values);
-        return v;
-    };
-    const auto onOff = [&] {
-        if (value != "on" && value != "off") refuse("on|off");
-        return value == "on";
-    };
     if (key == "resolution") {
-        options.resolution = int(number(8, 2048, "8..2048"));
+        options.resolution = int(numberOption(key, value, 8, 2048, "8..2048"));
     } else if (key == "tolerance_angle") {
-        options.tolerance_angle = number(0, 80, "0..80");
+        options.tolerance_angle = numberOption(key, value, 0, 80, "0..80");
     } else if (key == "block_size") {
-        options.block_size = int(number(1, 64, "1..64"));
+        options.block_size = int(numberOption(key, value, 1, 64, "1..64"));
     } else if (key == "lattice") {
-        if (value != "triangles" && value != "squares") refuse("triangles|squares");
+        if (value != "triangles" && value != "squares")
+            refuseOption(key, value, "triangles|squares");
         options.equilateral = value == "triangles";
     } else if (key == "scored") {
-        options.scored = onOff();
+        options.scored = switchOption(key, value);
     } else if (key == "partial") {
-        options.partial = onOff();
+        options.partial = switchOption(key, value);
     } else if (key == "directions") {
-        if (value != "6" && value != "32" && value != "128") refuse("6|32|128");
+        if (value != "6" && value != "32" && value != "128") refuseOption(key, value, "6|32|128");
         options.directions = std::stoi(value);
     } else {
         throw Error(ErrorCode::kInvalidArgument, "--set",
@@ -57,12 +42,11 @@ namespace {
 constexpr float kEyeDistance = 20.0f;    // of orthographic rays, in radii: footprints hardly grow
 constexpr float kDepthTolerance = 2.0f;  // pixels: what lies no deeper is the same surface
 constexpr int kRotations = 4, kShifts = 4, kTests = kRotations * kShifts;
-constexpr uint32_t kNobody = 0xffffffffu;
 
 struct Sample {
     Vec3 position = Vec3(0), normal = Vec3(0), albedo = Vec3(0);  // relative to the centre
     float facing = 0.0f;  // cosine of the angle to the projection's direction
-    uint8_t finish = 0;
+    uint32_t finish_key = 0;
 };
 
 Vec3 projectionOf(int index, int count) {
@@ -147,13 +131,26 @@ public:
           pool_(pool),
           cancel_(cancel) {}
 
-    std::vector<SurfelFinish> finishes;
     PointBlockReport report;
+
+    // By key, in order.
+    std::map<uint32_t, uint8_t> finishIndices(const std::vector<std::vector<Sample>>& levels,
+                                              std::vector<SurfelFinish>& finishes) const {
+        std::map<uint32_t, uint8_t> index_of;
+        for (const std::vector<Sample>& samples : levels) {
+            for (const Sample& s : samples) index_of[s.finish_key] = 0;
+        }
+        for (auto& [key, index] : index_of) {
+            index = uint8_t(finishes.size());
+            finishes.push_back(makeFinish(key));
+        }
+        return index_of;
+    }
 
     // Samples without holes where pixels are that large.
     std::vector<Sample> build(float pixel, const std::function<void(double)>& progress) {
         const int n = options_.directions;
-        std::vector<std::vector<Sample>> seen(size_t(n) * 1);
+        std::vector<std::vector<Sample>> seen(static_cast<size_t>(n));
         // A view's samples, block by block; blocks begin at block_begin.
         std::vector<std::vector<uint32_t>> block_begin(seen.size());
         for (int d = 0; d < n; ++d) {
@@ -226,6 +223,8 @@ public:
     }
 
 private:
+    static constexpr uint32_t kMostMaterials = 256, kFinishesEach = 16;
+
     void throwIfAsked() const {
         if (cancel_.requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
     }
@@ -274,7 +273,7 @@ private:
                     s.normal = hits[k].normal_world;
                     s.albedo = hits[k].albedo;
                     s.facing = std::abs(glm::dot(s.normal, to_viewer));
-                    s.finish = finishOf(hits[k]);
+                    s.finish_key = finishKey(hits[k]);
                     of_row[row].push_back(s);
                 }
                 if (of_row[row].size() > before) begin_of_row[row].push_back(uint32_t(before));
@@ -291,38 +290,43 @@ private:
         report.rays = rays_cast_;
     }
 
-    // One of at most 256: material, and what its textures made of it, coarsely.
-    uint8_t finishOf(const RayHit& hit) {
+    // Names a finish: material, and what its textures made of it, coarsely; of very many materials
+    // nothing but the material.
+    uint32_t finishKey(const RayHit& hit) const {
         const auto level = [](float v, int n) {
-            return int(std::lround(std::clamp(v, 0.0f, 1.0f) * float(n)));
+            return uint32_t(std::lround(std::clamp(v, 0.0f, 1.0f) * float(n)));
         };
-        const int metallic = level(hit.finish.metallic, 2),
-                  roughness = level(hit.finish.roughness, 4);
-        const uint64_t key =
-            uint64_t(hit.material) << 16 | uint64_t(metallic) << 8 | uint64_t(roughness);
-        const std::lock_guard lock(mutex_);
-        const auto found = finish_of_.find(key);
-        if (found != finish_of_.end()) return found->second;
-        if (finishes.size() == 256) {
-            for (const auto& [other, index] : finish_of_) {
-                if (other >> 16 == hit.material) return index;
-            }
-            return 255;
-        }
-        const Material& material = materials_[hit.material];
+        const uint32_t material = hit.material % kMostMaterials;
+        const Material& m = materials_[hit.material];
+        if (materials_.size() * kFinishesEach > size_t(kMostMaterials)) return material << 8;
+        const float most = std::max({m.emissive.x, m.emissive.y, m.emissive.z, 1e-6f});
+        const float shines =
+            std::max({hit.finish.emissive.x, hit.finish.emissive.y, hit.finish.emissive.z}) / most;
+        return material << 8 | level(hit.finish.metallic, 1) << 4 |
+               level(hit.finish.roughness, 3) << 1 | level(shines, 1);
+    }
+
+    SurfelFinish makeFinish(uint32_t key) const {
+        const Material& from = materials_[key >> 8];
         SurfelFinish finish;
-        finish.material.name = material.name;
-        finish.material.double_sided = material.double_sided;
-        finish.material.translucency = material.translucency;
-        finish.material.unlit = material.unlit;
-        finish.material.metallic = hit.finish.metallic;
-        finish.material.roughness = hit.finish.roughness;
-        finish.material.specular = hit.finish.specular;
-        finish.material.specular_weight = hit.finish.specular_edge;
-        finish.material.emissive = hit.finish.emissive;
-        finish.patch_width = patch_width_[hit.material];
-        finishes.push_back(finish);
-        return finish_of_[key] = uint8_t(finishes.size() - 1);
+        Material& m = finish.material;
+        m.name = from.name;
+        m.double_sided = from.double_sided;
+        m.translucency = from.translucency;
+        m.unlit = from.unlit;
+        m.specular = from.specular;
+        m.specular_weight = from.specular_weight;
+        finish.patch_width = patch_width_[key >> 8];
+        if (from.isTextured() && materials_.size() * kFinishesEach <= size_t(kMostMaterials)) {
+            m.metallic = float(key >> 4 & 1);
+            m.roughness = float(key >> 1 & 3) / 3.0f;
+            m.emissive = from.emissive * float(key & 1);
+        } else {
+            m.metallic = from.metallic;
+            m.roughness = from.roughness;
+            m.emissive = from.emissive;
+        }
+        return finish;
     }
 
     // Adds the view's blocks that what was chosen does not make up for.
@@ -408,8 +412,6 @@ private:
     const PointBlockOptions& options_;
     ThreadPool& pool_;
     const CancelFlag& cancel_;
-    std::mutex mutex_;
-    std::map<uint64_t, uint8_t> finish_of_;
     std::atomic<uint64_t> rays_cast_{0};
 };
 
@@ -433,18 +435,24 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
     model.area = area;
     constexpr int kCoarsest = 8;  // pixels along the sphere
     double done = 0.0, share = 0.7;
+    std::vector<std::vector<Sample>> levels;
     for (int resolution = options.resolution; resolution >= kCoarsest; resolution /= 2) {
         const float pixel = float(2.0 * radius / resolution);
-        const std::vector<Sample> samples =
-            builder.build(pixel, [&](double fraction) { progress(done + share * fraction); });
+        levels.push_back(
+            builder.build(pixel, [&](double fraction) { progress(done + share * fraction); }));
         done += share;
         share *= 0.3;
-        if (samples.empty()) break;
+        if (levels.back().empty()) levels.pop_back();
+    }
+    if (levels.empty())
+        throw Error(ErrorCode::kInvalidArgument, "", "no ray hits anything: is it too fine?");
+    const std::map<uint32_t, uint8_t> index_of = builder.finishIndices(levels, model.finishes);
+    for (size_t l = 0; l < levels.size(); ++l) {
+        const float pixel = float(2.0 * radius / (options.resolution >> l));
         std::vector<Surfel> surfels;
-        for (const Sample& s : samples) {
-            surfels.push_back({s.position, s.normal, s.albedo, s.finish, 1.0f});
-        }
-        SurfelLevel level = packSurfels(std::move(surfels), builder.finishes, pixel, false);
+        for (const Sample& s : levels[l])
+            surfels.push_back({s.position, s.normal, s.albedo, index_of.at(s.finish_key), 1.0f});
+        SurfelLevel level = packSurfels(std::move(surfels), model.finishes, pixel, false);
         builder.findMasks(pixel, level);
         // From about the centre to where the source is.
         for (SurfelBlock& block : level.blocks) {
@@ -452,17 +460,12 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
             block.bounds.max += Vec3(center);
             block.cone_apex += Vec3(center);
         }
-        if (model.levels.empty()) {
-            builder.report.samples_kept = level.size();
-            if (area > 0.0)
-                builder.report.per_pixel =
-                    double(level.size()) * double(pixel) * double(pixel) / area;
-        }
         model.levels.push_back(std::move(level));
     }
-    if (model.levels.empty())
-        throw Error(ErrorCode::kInvalidArgument, "", "no ray hits anything: is it too fine?");
-    model.finishes = builder.finishes;
+    const double pixel = 2.0 * radius / options.resolution;
+    builder.report.samples_kept = model.levels[0].size();
+    if (area > 0.0)
+        builder.report.per_pixel = double(model.levels[0].size()) * pixel * pixel / area;
     report = builder.report;
     report.seconds = watch.seconds();
     return model;

@@ -2,6 +2,7 @@
 #include <sampling/point_list.h>
 
 #include <core/image.h>
+#include <core/octahedral.h>
 #include <core/rng.h>
 #include <scenegraph/object_id.h>
 #include <scenegraph/surface_at.h>
@@ -32,24 +33,15 @@ uint32_t to8(float linear) {
 }  // namespace
 
 uint32_t packOctahedral(const Vec3& n) {
-    const float s = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-    Vec2 p = s > 0.0f ? Vec2(n.x, n.y) / s : Vec2(0.0f);
-    if (n.z < 0.0f) {
-        p = Vec2((1.0f - std::abs(p.y)) * (p.x >= 0.0f ? 1.0f : -1.0f),
-                 (1.0f - std::abs(p.x)) * (p.y >= 0.0f ? 1.0f : -1.0f));
-    }
+    const Vec2 p = octahedralOf(n);
     const auto q = [](float v) { return uint32_t(std::lround((v * 0.5f + 0.5f) * 65535.0f)); };
     return q(p.x) | q(p.y) << 16;
 }
 
 Vec3 unpackOctahedral(uint32_t packed) {
-    const float x = float(packed & 0xffff) * (2.0f / 65535.0f) - 1.0f;
-    const float y = float(packed >> 16) * (2.0f / 65535.0f) - 1.0f;
-    Vec3 n(x, y, 1.0f - std::abs(x) - std::abs(y));
-    const float t = std::max(-n.z, 0.0f);
-    n.x += n.x >= 0.0f ? -t : t;
-    n.y += n.y >= 0.0f ? -t : t;
-    return glm::normalize(n);
+    constexpr float kStep = 2.0f / 65535.0f;
+    return octahedralNormal(float(packed & 0xffff) * kStep - 1.0f,
+                            float(packed >> 16) * kStep - 1.0f);
 }
 
 uint32_t packSrgb8(const Vec3& c) { return to8(c.x) | to8(c.y) << 8 | to8(c.z) << 16; }

@@ -3,6 +3,7 @@
 
 #include <core/error.h>
 #include <core/image.h>
+#include <core/octahedral.h>
 #include <scenegraph/morton.h>
 #include <scenegraph/visible_area.h>
 
@@ -78,24 +79,14 @@ int maskDirectionIndex(const Vec3& direction) {
 }
 
 uint16_t packNormal16(const Vec3& n) {
-    const float s = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-    Vec2 p = s > 0.0f ? Vec2(n.x, n.y) / s : Vec2(0.0f);
-    if (n.z < 0.0f) {
-        p = Vec2((1.0f - std::abs(p.y)) * (p.x >= 0.0f ? 1.0f : -1.0f),
-                 (1.0f - std::abs(p.x)) * (p.y >= 0.0f ? 1.0f : -1.0f));
-    }
+    const Vec2 p = octahedralOf(n);
     const auto q = [](float v) { return uint16_t(std::lround((v * 0.5f + 0.5f) * 255.0f)); };
     return uint16_t(q(p.x) | q(p.y) << 8);
 }
 
 Vec3 unpackNormal16(uint16_t packed) {
-    const float x = float(packed & 255) * (2.0f / 255.0f) - 1.0f,
-                y = float(packed >> 8) * (2.0f / 255.0f) - 1.0f;
-    Vec3 n(x, y, 1.0f - std::abs(x) - std::abs(y));
-    const float t = std::max(-n.z, 0.0f);
-    n.x += n.x >= 0.0f ? -t : t;
-    n.y += n.y >= 0.0f ? -t : t;
-    return glm::normalize(n);
+    constexpr float kStep = 2.0f / 255.0f;
+    return octahedralNormal(float(packed & 255) * kStep - 1.0f, float(packed >> 8) * kStep - 1.0f);
 }
 
 size_t SurfelModel::bytes() const {

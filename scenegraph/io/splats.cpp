@@ -2,13 +2,13 @@
 #include <scenegraph/io/splats.h>
 
 #include <core/image.h>
+#include <core/option_text.h>
 #include <core/rng.h>
 #include <core/stopwatch.h>
 #include <scenegraph/surface_at.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <nanoflann.hpp>
 #include <queue>
@@ -16,33 +16,18 @@
 namespace stipple {
 
 void applyOption(SplatOptions& options, const std::string& key, const std::string& value) {
-    const auto refuse = [&](const char* values) {
-        throw Error(ErrorCode::kInvalidArgument, "--set",
-                    "'" + value + "' is not a value of " + key + " (" + values + ")");
-    };
-    const auto number = [&](double low, double high, const char* values) {
-        double v = 0.0;
-        const auto [rest, error] = std::from_chars(value.data(), value.data() + value.size(), v);
-        if (error != std::errc() || rest != value.data() + value.size() || !(v >= low && v <= high))
-            refuse(values);
-        return v;
-    };
-    const auto onOff = [&] {
-        if (value != "on" && value != "off") refuse("on|off");
-        return value == "on";
-    };
     if (key == "tolerance") {
-        options.tolerance = number(1e-6, 100, "0.000001..100");
+        options.tolerance = numberOption(key, value, 1e-6, 100, "0.000001..100");
     } else if (key == "color_tolerance") {
-        options.color_tolerance = number(0, 2, "0..2");
+        options.color_tolerance = numberOption(key, value, 0, 2, "0..2");
     } else if (key == "neighbours") {
-        options.neighbours = int(number(4, 1000, "4..1000"));
+        options.neighbours = int(numberOption(key, value, 4, 1000, "4..1000"));
     } else if (key == "points") {
-        options.points = int(number(16, 1e8, "16..100000000"));
+        options.points = int(numberOption(key, value, 16, 1e8, "16..100000000"));
     } else if (key == "relax") {
-        options.relax = onOff();
+        options.relax = switchOption(key, value);
     } else if (key == "naive") {
-        options.naive = onOff();
+        options.naive = switchOption(key, value);
     } else {
         throw Error(
             ErrorCode::kInvalidArgument, "--set",

@@ -128,7 +128,7 @@ TEST(PointBlocks, noTearsWhenMagnifiedAndAtTheEdgesOfAWideView) {
 
 TEST(PointBlocks, sameBitsForAnyThreadsBuiltAndDrawn) {
     ThreadPool one(1), three(3);
-    const Pair a = makePair(torus(), 48, one), b = makePair(torus(), 48, three);
+    const Pair a = makePair(tree(), 48, one), b = makePair(tree(), 48, three);
     EXPECT_EQ(surfelFileText(*a.model.meshes[0].surfels),
               surfelFileText(*b.model.meshes[0].surfels));
     const Camera camera = cameraTo(a.source, maskDirectionOf(3), 48, 100, 1.5);
