@@ -33,7 +33,7 @@ window=$(timeout 60 xdotool search --sync --name 'Stipple - small' | head -n 1)
 [[ -n $window ]] || fail "no window"
 xdotool windowmove "$window" 0 0
 xdotool windowfocus "$window" 2>/dev/null
-key() { xdotool key "$1"; sleep 0.5; }
+key() { xdotool key "$1"; sleep 1; }
 # shot NAME [differs|equals OTHER]: a screenshot of the picture that has come to rest (two in a row are the same).
 shot() {
     local i
@@ -60,8 +60,8 @@ key h  # without the panel
 shot before.png
 # Plant on the floor, right of the middle.
 key 2
-xdotool mousemove 330 260 sleep 0.2 click 1
-sleep 0.5
+xdotool mousemove 330 260 sleep 0.5 click 1
+sleep 2
 shot planted.png differs before.png
 key ctrl+z
 shot undone.png equals before.png
@@ -71,8 +71,8 @@ key ctrl+s
 grep -q '"placed"' small-edited.scene.json || fail "not saved"
 # Select the first ball and remove it.
 key 1
-xdotool mousemove 170 190 sleep 0.2 click 1
-sleep 0.5
+xdotool mousemove 170 190 sleep 0.5 click 1
+sleep 2
 key Delete
 shot removed.png differs redone.png
 # Orbit, and back again.
