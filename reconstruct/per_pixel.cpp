@@ -34,6 +34,8 @@ bool fillOnce(DepthTile& tile, const Behind& behind, std::vector<uint64_t>& scra
             // Opposite neighbours on a surface in front of this subpixel: something solid passes
             // here.
             const float here = DepthTile::depthOf(*c);
+            // Of two neighbours at least one must be in front: most subpixels end here.
+            if (!(behind.of(DepthTile::depthOf(std::min(c[-1], c[1]))) < here)) continue;
             const uint64_t around[8] = {c[-w - 1], c[-w], c[-w + 1], c[1],
                                         c[w + 1],  c[w],  c[w - 1],  c[-1]};
             int in_front = 0, on_surface = 0;
@@ -110,11 +112,13 @@ public:
         for (int py = inner_.y0 / s; py < inner_.y1 / s; ++py) {
             for (int px = inner_.x0 / s; px < inner_.x1 / s; ++px) {
                 PixelSums sums;
-                for (int y = py * s; y < (py + 1) * s; ++y) {
-                    const uint64_t* row = tile_.row(y);
-                    for (int x = px * s; x < (px + 1) * s; ++x)
-                        addSubpixel(lookup, row[x], x, y, sums);
-                }
+                shader_.showPixel(lookup, tile_, px, py, [&](int, int, uint64_t key) {
+                    if (DepthTile::numberOf(key) == kNoNumber) {
+                        sums.addNothing();
+                    } else {
+                        sums.add(shader_.sample(), shader_.radiance(), DepthTile::depthOf(key));
+                    }
+                });
                 depth_pass_.addCount(px, py, sums);
                 context_.picture->write(px, py, sums);
             }
@@ -123,16 +127,6 @@ public:
     TileCounters counters() const override { return depth_pass_.counters(); }
 
 private:
-    // Shading is per subpixel.
-    void addSubpixel(const SampleLookup& lookup, uint64_t key, int x, int y, PixelSums& sums) {
-        if (DepthTile::numberOf(key) == kNoNumber) {
-            sums.addNothing();
-            return;
-        }
-        shader_.show(lookup, key, x, y);
-        sums.add(shader_.sample(), shader_.radiance());
-    }
-
     const ReconstructionContext context_;
     DepthPass depth_pass_;
     const bool is_splat_;

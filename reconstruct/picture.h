@@ -26,13 +26,15 @@ struct PixelSums {
     float samples = 0.0f;  // samples
     float points = 0.0f;   // kept points that fell into the pixel
 
-    void add(const SurfaceSample& s, const Vec3& shaded) {
+    void add(const SurfaceSample& s, const Vec3& shaded) { add(s, shaded, s.depth); }
+    // With the depth of a place nearby.
+    void add(const SurfaceSample& s, const Vec3& shaded, float at_depth) {
         radiance += shaded;
         normal += s.normal_world;
         albedo += s.albedo;
-        depth += s.depth;
-        depth_max = std::max(depth_max, s.depth);
-        if (s.depth < nearest) nearest = s.depth, object = s.object;
+        depth += at_depth;
+        depth_max = std::max(depth_max, at_depth);
+        if (at_depth < nearest) nearest = at_depth, object = s.object;
         covered += 1.0f;
         samples += 1.0f;
     }

@@ -29,6 +29,33 @@ void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y
     last_number_ = number;
 }
 
+bool SubpixelShader::showAll(const SampleLookup& lookup, const Cell& cell, int first,
+                             uint32_t members) {
+    const uint32_t number = cell.number[first];
+    if (members == uint32_t(1) << first || context_.sun_visibility || number == varied_number_)
+        return false;
+    // Of a plane 1 / depth (orthographic: depth) is affine in the picture.
+    const bool orthographic = context_.view.orthographic;
+    float x = 0.0f, y = 0.0f, q = 0.0f;
+    const float n = float(std::popcount(members));
+    for (uint32_t m = members; m; m &= m - 1) {
+        const int i = std::countr_zero(m);
+        const float depth = DepthTile::depthOf(cell.key[i]);
+        x += float(cell.x[i]), y += float(cell.y[i]);
+        q += orthographic ? depth : 1.0f / depth;
+    }
+    const Vec2 at(x / n + 0.5f, y / n + 0.5f);
+    const float depth = orthographic ? q / n : n / q;
+    Vec3 origin, direction;
+    context_.view.ray(at.x, at.y, origin, direction);
+    sample_.extent = std::sqrt(n);
+    showPoint(lookup, origin + direction * depth, number, at);
+    sample_.extent = 1.0f;
+    if ((*context_.materials)[sample_.material].normal_map.texture == kNoTexture) return true;
+    varied_number_ = number;
+    return false;
+}
+
 void SubpixelShader::showPoint(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
                                const Vec2& p_sub) {
     sample_.depth = p_camera.z;

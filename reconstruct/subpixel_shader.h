@@ -6,6 +6,8 @@
 #include <reconstruct/depth_tile.h>
 #include <reconstruct/reconstruction.h>
 
+#include <bit>
+
 namespace stipple {
 
 class SubpixelShader {
@@ -13,9 +15,16 @@ public:
     explicit SubpixelShader(const ReconstructionContext& context) : context_(context) {}
 
     // Numbers mean something else in another tile.
-    void forget() { last_number_ = kNoNumber; }
+    void forget() { last_number_ = varied_number_ = kNoNumber; }
     // Surface and radiance of a key that is not empty, seen at the centre of subpixel (x, y).
     void show(const SampleLookup& lookup, uint64_t key, int x, int y);
+    // Calls take(x, y, key) for all subpixels of pixel (px, py) after surface and radiance have
+    // been set, where the key is not empty: once for all that show the same point or triangle, seen
+    // in their middle. Once for each where shadows may fall between them or the normal varies: what
+    // is mirrored does not average as normals do. Within cells of kSharedCells^2 subpixels.
+    template <class Take>
+    void showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
+                   const Take& take);
     // Surface and radiance of a point, whose position is known.
     void showPoint(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
                    const Vec2& p_sub);
@@ -25,10 +34,68 @@ public:
     Vec3 shadeSample(const SurfaceSample& sample) const;
 
 private:
+    static constexpr int kSharedCells = 4;
+    struct Cell;
+    template <class Take>
+    void showCell(const SampleLookup& lookup, const Cell& cell, const Take& take);
+    // False if members of a cell are not alike.
+    bool showAll(const SampleLookup& lookup, const Cell& cell, int first, uint32_t members);
+
     const ReconstructionContext& context_;
     uint32_t last_number_ = kNoNumber;
+    uint32_t varied_number_ = kNoNumber;  // the last triangle whose normal was found to vary
     SurfaceSample sample_;
     Vec3 radiance_ = Vec3(0);
 };
+
+// Subpixels that may share a look-up.
+struct SubpixelShader::Cell {
+    static constexpr int kMost = kSharedCells * kSharedCells;
+    int count = 0;
+    uint32_t number[kMost];
+    uint64_t key[kMost];
+    int x[kMost], y[kMost];
+};
+
+template <class Take>
+void SubpixelShader::showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
+                               const Take& take) {
+    const int s = context_.view.subpixels;
+    Cell cell;
+    for (int top = py * s; top < (py + 1) * s; top += kSharedCells) {
+        for (int left = px * s; left < (px + 1) * s; left += kSharedCells) {
+            const int bottom = std::min(top + kSharedCells, (py + 1) * s),
+                      right = std::min(left + kSharedCells, (px + 1) * s);
+            cell.count = 0;
+            for (int y = top; y < bottom; ++y) {
+                const uint64_t* row = tile.row(y);
+                for (int x = left; x < right; ++x, ++cell.count) {
+                    cell.key[cell.count] = row[x];
+                    cell.number[cell.count] = DepthTile::numberOf(row[x]);
+                    cell.x[cell.count] = x, cell.y[cell.count] = y;
+                }
+            }
+            showCell(lookup, cell, take);
+        }
+    }
+}
+
+template <class Take>
+void SubpixelShader::showCell(const SampleLookup& lookup, const Cell& cell, const Take& take) {
+    uint32_t left = uint32_t((uint64_t(1) << cell.count) - 1);
+    while (left) {
+        const int first = std::countr_zero(left);
+        const uint32_t number = cell.number[first];
+        uint32_t members = 0;
+        for (int i = first; i < cell.count; ++i) members |= uint32_t(cell.number[i] == number) << i;
+        left &= ~members;
+        const bool is_shared = number != kNoNumber && showAll(lookup, cell, first, members);
+        for (; members; members &= members - 1) {
+            const int i = std::countr_zero(members);
+            if (number != kNoNumber && !is_shared) show(lookup, cell.key[i], cell.x[i], cell.y[i]);
+            take(cell.x[i], cell.y[i], cell.key[i]);
+        }
+    }
+}
 
 }  // namespace stipple

@@ -5,12 +5,13 @@
 
 namespace stipple {
 
-LookupBeam subpixelBeam(const View& view, float sub_x, float sub_y, float depth, float length_scale,
-                        const Mat3& camera_from_normal) {
+LookupBeam sampleBeam(const View& view, float sub_x, float sub_y, const SurfaceSample& sample,
+                      float length_scale, const Mat3& camera_from_normal) {
     Vec3 origin, direction;
     view.ray(sub_x, sub_y, origin, direction);
     // Normals go by the inverse transpose, up to a factor: its transpose takes directions back.
-    return {(view.orthographic ? 1.0f : depth) / (float(view.focal) * length_scale),
+    return {(view.orthographic ? 1.0f : sample.depth) * sample.extent /
+                (float(view.focal) * length_scale),
             glm::transpose(camera_from_normal) * direction};
 }
 
@@ -46,10 +47,10 @@ void pointAttributes(const Scene& scene, const View& view, const Run& run, const
             length_scale *= float(std::sqrt(area_scale));
         }
         const Vec2 place = unpackPlace(list.albedo_or_place[lane]);
-        const MeshSurface surface = surfaceAt(
-            scene.meshes[mesh_ref.index()], scene.materials, scene.textures,
-            list.normal_or_triangle[lane], place.x, place.y,
-            subpixelBeam(view, sub_x, sub_y, sample.depth, length_scale, camera_from_normal));
+        const MeshSurface surface =
+            surfaceAt(scene.meshes[mesh_ref.index()], scene.materials, scene.textures,
+                      list.normal_or_triangle[lane], place.x, place.y,
+                      sampleBeam(view, sub_x, sub_y, sample, length_scale, camera_from_normal));
         normal_camera = camera_from_normal * surface.normal_object;
         sample.albedo = surface.albedo;
         sample.finish = surface.finish;

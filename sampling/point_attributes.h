@@ -14,7 +14,7 @@ void pointAttributes(const Scene& scene, const View& view, const Run& run, const
 
 // The beam through a subpixel at that depth, in a space whose lengths grow by length_scale on the
 // way to the camera and whose normals go there by camera_from_normal.
-LookupBeam subpixelBeam(const View& view, float sub_x, float sub_y, float depth, float length_scale,
-                        const Mat3& camera_from_normal);
+LookupBeam sampleBeam(const View& view, float sub_x, float sub_y, const SurfaceSample& sample,
+                      float length_scale, const Mat3& camera_from_normal);
 
 }  // namespace stipple

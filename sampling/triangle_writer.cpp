@@ -37,8 +37,8 @@ void triangleAttributes(const Scene& scene, const View& view, const InstanceFram
                                    linear * mesh.positions[t.z] + translation, origin, direction);
     const MeshSurface surface =
         surfaceAt(mesh, scene.materials, scene.textures, triangle, uv.x, uv.y,
-                  subpixelBeam(view, sub_x, sub_y, sample.depth, float(std::sqrt(frame.area_scale)),
-                               frame.camera_from_normal));
+                  sampleBeam(view, sub_x, sub_y, sample, float(std::sqrt(frame.area_scale)),
+                             frame.camera_from_normal));
     sample.normal_world = glm::normalize(Mat3(glm::transpose(view.camera_from_world)) *
                                          (frame.camera_from_normal * surface.normal_object));
     sample.albedo = surface.albedo;

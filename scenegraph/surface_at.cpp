@@ -10,8 +10,11 @@ T interpolate(const std::vector<T>& values, const UVec3& t, float u, float v) {
     return values[t.x] * (1.0f - u - v) + values[t.y] * u + values[t.z] * v;
 }
 
-// Scaled before it is normalized: edge products of small triangles underflow in float.
+// Scaled before it is normalized where it must be: edge products of small triangles underflow in
+// float.
 Vec3 safeNormalize(const Vec3& v) {
+    const float squared = glm::dot(v, v);
+    if (squared > 1e-30f && squared < 1e30f) return v * (1.0f / std::sqrt(squared));
     const float largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
     return largest > 0.0f ? glm::normalize(v / largest) : v;
 }

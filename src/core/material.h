@@ -19,7 +19,8 @@ struct Texture {
     bool srgb = true;  // colour textures are sRGB-encoded, all else is linear
     Wrap wrap_u = Wrap::kRepeat;
     Wrap wrap_v = Wrap::kRepeat;
-    bool nearest = false;  // no interpolation between texels
+    bool nearest = false;    // no interpolation between texels
+    bool is_opaque = false;  // no texel has an alpha below 1; buildMipmaps() finds out
     struct Level {
         int width = 0;
         int height = 0;

@@ -20,6 +20,7 @@ struct SurfaceFinish {
 
 struct SurfaceSample {
     float depth = kInfinity;         // camera z; infinite where there is nothing
+    float extent = 1.0f;             // side of the square of the picture it stands for, subpixels
     Vec3 position_camera = Vec3(0);  // relative to the eye
     Vec3 normal_world =
         Vec3(0, 1, 0);      // unit, shading normal, on the side the asset's author gave it

@@ -108,12 +108,23 @@ Vec4 sampleLevel(const Texture& texture, const Texture::Level& level, float u, f
     const float x = u * level.width - 0.5f, y = v * level.height - 0.5f;
     const int x0 = int(std::floor(x)), y0 = int(std::floor(y));
     const float fx = x - x0, fy = y - y0;
+    const int rows[2] = {wrapTexel(y0, level.height, texture.wrap_v),
+                         wrapTexel(y0 + 1, level.height, texture.wrap_v)},
+              columns[2] = {wrapTexel(x0, level.width, texture.wrap_u),
+                            wrapTexel(x0 + 1, level.width, texture.wrap_u)};
+    if (texture.is_opaque) {
+        const auto texel = [&](int i, int j) {
+            const uint8_t* t = level.rgba.data() + (size_t(rows[j]) * level.width + columns[i]) * 4;
+            return Vec3(linear[t[0]], linear[t[1]], linear[t[2]]);
+        };
+        return Vec4(glm::mix(glm::mix(texel(0, 0), texel(1, 0), fx),
+                             glm::mix(texel(0, 1), texel(1, 1), fx), fy),
+                    1.0f);
+    }
     Weighted sum;
     for (int j = 0; j < 2; ++j) {
-        const int row = wrapTexel(y0 + j, level.height, texture.wrap_v);
         for (int i = 0; i < 2; ++i) {
-            const int column = wrapTexel(x0 + i, level.width, texture.wrap_u);
-            sum.add(readTexel(level, linear, column, row),
+            sum.add(readTexel(level, linear, columns[i], rows[j]),
                     (i ? fx : 1.0f - fx) * (j ? fy : 1.0f - fy));
         }
     }
@@ -131,6 +142,9 @@ size_t Texture::bytes() const {
 void buildMipmaps(Texture& texture) {
     if (texture.levels.empty()) return;
     texture.levels.resize(1);
+    const std::vector<uint8_t>& rgba = texture.levels[0].rgba;
+    texture.is_opaque = true;
+    for (size_t i = 3; i < rgba.size(); i += 4) texture.is_opaque &= rgba[i] == 255;
     int width = texture.levels[0].width, height = texture.levels[0].height;
     std::vector<Vec4> finer;  // the level before, unrounded; empty for level 0
     while (width > 1 || height > 1) {
@@ -169,6 +183,7 @@ Vec4 sampleTexture(const Texture& texture, Vec2 uv, float footprint_uv) {
     const Vec4 fine = sampleLevel(texture, texture.levels[below], u, v);
     if (share == 0.0f) return fine;
     const Vec4 coarse = sampleLevel(texture, texture.levels[below + 1], u, v);
+    if (texture.is_opaque) return glm::mix(fine, coarse, share);
     Weighted sum;
     sum.add(fine, 1.0f - share);
     sum.add(coarse, share);
