@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <core/error.h>
+#include <scenegraph/procedural/uv_grid.h>
+#include <scenegraph/procedural/uv_grid_lattice.h>
+
+#include <array>
+#include <unordered_map>
+
+namespace stipple {
+
+namespace {
+
+constexpr int kCurvedCells = 128;  // along curved sides, without tables
+constexpr double kMostTriangles = 5e7;
+// An edge is halved where its halves differ by this much of its length: bent by 29 degrees, or one
+// half 1.7 times as long as the other.
+constexpr double kMostDifference = 0.25;
+
+class UvGridBuilder {
+public:
+    UvGridBuilder(const UvGridParams& params, const GridLattice& us, const GridLattice& vs,
+                  ThreadPool& pool)
+        : params_(params),
+          us_(us),
+          vs_(vs),
+          pool_(pool),
+          surface_(params, DVec2(us.finestStep(), vs.finestStep())) {}
+
+    void makeCells() {
+        const size_t columns = size_t(us_.cellCount()) + 1, rows = size_t(vs_.cellCount()) + 1;
+        const int step = us_.stepsPerCell();
+        reserve(2.0 * double(columns - 1) * double(rows - 1));
+        vertices_.resize(columns * rows);
+        for (size_t k = 0; k < vertices_.size(); ++k)
+            vertices_[k] = {int(k % columns) * step, int(k / columns) * step};
+        positions_.resize(vertices_.size());
+        forEachVertex([&](size_t k) { positions_[k] = positionAt(vertices_[k]); });
+        triangles_.reserve(2 * (columns - 1) * (rows - 1));
+        for (size_t j = 0; j + 1 < rows; ++j) {
+            for (size_t i = 0; i + 1 < columns; ++i) {
+                const uint32_t a = uint32_t(j * columns + i), b = a + 1, d = a + uint32_t(columns),
+                               c = d + 1;
+                addQuad({a, b, c, d}, triangles_);
+            }
+        }
+    }
+
+    void refine() {
+        // The edges need about as much memory as their triangles will.
+        const double before = double(triangles_.size());
+        reserve(before);
+        std::unordered_map<uint64_t, uint32_t> middles;  // by edge; kNone: it is not halved
+        std::vector<UVec3> finer;
+        finer.reserve(triangles_.size());
+        const auto middleOf = [&](uint32_t a, uint32_t b) {
+            const uint64_t edge = uint64_t(std::min(a, b)) << 32 | std::max(a, b);
+            const auto [it, is_new] = middles.try_emplace(edge, kNone);
+            if (is_new) it->second = halve(a, b);
+            return it->second;
+        };
+        for (const UVec3& t : triangles_) {
+            std::array<uint32_t, 3> corner{t.x, t.y, t.z}, middle;
+            for (int k = 0; k < 3; ++k) middle[k] = middleOf(corner[k], corner[(k + 1) % 3]);
+            split(corner, middle, finer);
+            if (double(finer.size()) > kMostTriangles) {
+                throw Error(ErrorCode::kInvalidArgument, "",
+                            "refined to more than " + std::to_string(size_t(kMostTriangles)) +
+                                " triangles");
+            }
+        }
+        reserve(std::max(double(finer.size()) - 2.0 * before, 0.0));
+        triangles_.swap(finer);
+    }
+
+    GridStretch measureStretch() const {
+        // Least and most of the triangles at each vertex. What is compressed counts as unstretched.
+        std::vector<float> least(vertices_.size(), kInfinity), most(vertices_.size(), 0.0f);
+        std::vector<DVec3> base(vertices_.size());
+        forEachVertex([&](size_t k) {
+            const Lattice& at = vertices_[k];
+            base[k] = surface_.base(us_.at(at.i), vs_.at(at.j));
+        });
+        double whole = 0.0;
+        for (const UVec3& t : triangles_) whole += doubleArea(base, t);
+        const double tiny = 1e-9 * whole / double(std::max<size_t>(triangles_.size(), 1));
+        for (const UVec3& t : triangles_) {
+            const double flat = doubleArea(base, t);
+            if (!(flat > tiny)) continue;
+            const float stretch = float(std::max(doubleArea(positions_, t) / flat, 1.0));
+            for (int k = 0; k < 3; ++k) {
+                least[t[k]] = std::min(least[t[k]], stretch);
+                most[t[k]] = std::max(most[t[k]], stretch);
+            }
+        }
+        GridStretch result;
+        for (size_t k = 0; k < vertices_.size(); ++k) {
+            const double ratio = most[k] > 0.0f ? double(most[k]) / double(least[k]) : 1.0;
+            if (ratio > kMostStretch) result.share += 1.0 / double(vertices_.size());
+            if (ratio <= result.most) continue;
+            result.most = ratio;
+            result.u = us_.at(vertices_[k].i), result.v = vs_.at(vertices_[k].j);
+        }
+        return result;
+    }
+
+    Mesh finish() {
+        const size_t n = vertices_.size();
+        Mesh mesh;
+        mesh.positions.resize(n), mesh.normals.resize(n), mesh.uvs.resize(n);
+        if (params_.has_tangents) mesh.tangents.resize(n);
+        forEachVertex([&](size_t k) {
+            const Lattice& at = vertices_[k];
+            DVec3 tangent;
+            mesh.positions[k] = Vec3(positions_[k]);
+            mesh.normals[k] = Vec3(surface_.normal(us_.at(at.i), vs_.at(at.j), tangent));
+            mesh.uvs[k] = Vec2(DVec2(us_.unwrapped(at.i), 1.0 - vs_.unwrapped(at.j)) *
+                               params_.texture_repeat);
+            if (params_.has_tangents) mesh.tangents[k] = Vec4(Vec3(tangent), 1.0f);
+        });
+        mesh.triangles = std::move(triangles_);
+        mesh.triangle_material.assign(mesh.triangles.size(), 0);
+        return mesh;
+    }
+
+private:
+    static constexpr uint32_t kNone = UINT32_MAX;
+    struct Lattice {
+        int i = 0, j = 0;
+    };
+
+    void reserve(double triangles) const {
+        if (params_.reserve) params_.reserve(triangles);
+    }
+    template <class Body>
+    void forEachVertex(const Body& body) const {
+        constexpr size_t kRun = 4096;
+        pool_.forEach((vertices_.size() + kRun - 1) / kRun, [&](size_t run, int) {
+            const size_t end = std::min((run + 1) * kRun, vertices_.size());
+            for (size_t k = run * kRun; k < end; ++k) body(k);
+        });
+    }
+    DVec3 positionAt(const Lattice& at) const {
+        return surface_.position(us_.at(at.i), vs_.at(at.j));
+    }
+    static double doubleArea(const std::vector<DVec3>& positions, const UVec3& t) {
+        return glm::length(
+            glm::cross(positions[t.y] - positions[t.x], positions[t.z] - positions[t.x]));
+    }
+
+    // Along the shorter diagonal: ridges stay ridges.
+    void addQuad(const std::array<uint32_t, 4>& q, std::vector<UVec3>& out) const {
+        if (glm::distance(positions_[q[0]], positions_[q[2]]) <=
+            glm::distance(positions_[q[1]], positions_[q[3]])) {
+            out.push_back(UVec3(q[0], q[1], q[2]));
+            out.push_back(UVec3(q[0], q[2], q[3]));
+        } else {
+            out.push_back(UVec3(q[1], q[2], q[3]));
+            out.push_back(UVec3(q[1], q[3], q[0]));
+        }
+    }
+
+    // The new vertex in the middle of an edge whose halves differ too much. Depends on the edge
+    // alone, and on both sides of a seam it is the same.
+    uint32_t halve(uint32_t a, uint32_t b) {
+        const Lattice middle{(vertices_[a].i + vertices_[b].i) / 2,
+                             (vertices_[a].j + vertices_[b].j) / 2};
+        const DVec3 p = positionAt(middle);
+        const double difference = glm::length(2.0 * p - positions_[a] - positions_[b]);
+        if (!(difference > kMostDifference * glm::distance(positions_[a], positions_[b])))
+            return kNone;
+        vertices_.push_back(middle);
+        positions_.push_back(p);
+        return uint32_t(vertices_.size() - 1);
+    }
+
+    void split(const std::array<uint32_t, 3>& c, const std::array<uint32_t, 3>& m,
+               std::vector<UVec3>& out) const {
+        const int n = int(m[0] != kNone) + int(m[1] != kNone) + int(m[2] != kNone);
+        if (n == 0) {
+            out.push_back(UVec3(c[0], c[1], c[2]));
+        } else if (n == 3) {
+            for (int k = 0; k < 3; ++k) out.push_back(UVec3(c[k], m[k], m[(k + 2) % 3]));
+            out.push_back(UVec3(m[0], m[1], m[2]));
+        } else {
+            // The first of the halved edges of which the one before is not.
+            int k = 0;
+            while (m[k] == kNone || m[(k + 2) % 3] != kNone) ++k;
+            const uint32_t a = c[k], b = c[(k + 1) % 3], top = c[(k + 2) % 3], ab = m[k],
+                           b_top = m[(k + 1) % 3];
+            if (n == 1) {
+                out.push_back(UVec3(a, ab, top));
+                out.push_back(UVec3(ab, b, top));
+            } else {
+                out.push_back(UVec3(ab, b, b_top));
+                addQuad({a, ab, b_top, top}, out);
+            }
+        }
+    }
+
+    const UvGridParams& params_;
+    const GridLattice &us_, &vs_;
+    ThreadPool& pool_;
+    DisplacedSurface surface_;
+    std::vector<Lattice> vertices_;
+    std::vector<DVec3> positions_;
+    std::vector<UVec3> triangles_;
+};
+
+// Texels of the finest table along one side (0: u, 1: v).
+int tableCells(const UvGridParams& params, int side) {
+    double most = 0.0;
+    for (const GridDisplacement& d : params.displacements) {
+        const GridTable::Level& finest = d.table.levels[0];
+        most = std::max(most, (side == 0 ? finest.width : finest.height) * d.repeat[side]);
+    }
+    return int(std::min(std::ceil(most), 1e9));
+}
+
+void checkRepeat(DVec2 repeat, const GridSurfaceInfo& info) {
+    for (int side = 0; side < 2; ++side) {
+        if ((side == 0 ? info.is_closed_u : info.is_closed_v) &&
+            repeat[side] != std::round(repeat[side])) {
+            throw Error(ErrorCode::kInvalidArgument, "",
+                        std::string("a ") + info.name + " closes on itself along " +
+                            (side == 0 ? "u" : "v") +
+                            ": tables must repeat a whole number of times there");
+        }
+    }
+}
+
+}  // namespace
+
+UvGrid makeUvGrid(UvGridParams params, ThreadPool& pool) {
+    const GridSurfaceInfo& info = gridSurface(params.shape.surface);
+    if (params.refine < 0 || params.refine > kMostRefine) {
+        throw Error(ErrorCode::kInvalidArgument, "",
+                    "refine must be in 0.." + std::to_string(kMostRefine));
+    }
+    checkRepeat(params.texture_repeat, info);
+    for (GridDisplacement& d : params.displacements) {
+        checkRepeat(d.repeat, info);
+        d.table.repeats_x = info.is_closed_u || d.repeat.x != 1.0;
+        d.table.repeats_y = info.is_closed_v || d.repeat.y != 1.0;
+    }
+    UvGrid grid;
+    grid.table_cells_u = tableCells(params, 0), grid.table_cells_v = tableCells(params, 1);
+    double u = GridLattice::wantedCells(grid.table_cells_u, info.is_curved_u ? kCurvedCells : 1),
+           v = GridLattice::wantedCells(grid.table_cells_v, info.is_curved_v ? kCurvedCells : 1);
+    const double shrink = std::min(std::sqrt(kMostCells / (u * v)), 1.0);
+    u = params.cells_u > 0 ? params.cells_u : std::max(1.0, std::floor(u * shrink));
+    v = params.cells_v > 0 ? params.cells_v : std::max(1.0, std::floor(v * shrink));
+    grid.cells_u = int(u), grid.cells_v = int(v);
+    if (2.0 * u * v > kMostTriangles) {
+        throw Error(ErrorCode::kInvalidArgument, "",
+                    "a grid of " + std::to_string(grid.cells_u) + " x " +
+                        std::to_string(grid.cells_v) + " cells has more than " +
+                        std::to_string(size_t(kMostTriangles)) + " triangles");
+    }
+    const GridLattice us(grid.cells_u, grid.table_cells_u, info.is_closed_u, params.refine),
+        vs(grid.cells_v, grid.table_cells_v, info.is_closed_v, params.refine);
+    UvGridBuilder builder(params, us, vs, pool);
+    builder.makeCells();
+    for (int pass = 0; pass < params.refine; ++pass) builder.refine();
+    grid.stretch = builder.measureStretch();
+    grid.mesh = builder.finish();
+    return grid;
+}
+
+}  // namespace stipple

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// Tables of numbers that move a grid's points, with mip levels.
+#pragma once
+
+#include <core/math.h>
+
+#include <vector>
+
+namespace stipple {
+
+struct GridTable {
+    struct Level {
+        int width = 0, height = 0;
+        std::vector<Vec3> texels;  // row by row
+    };
+    std::vector<Level> levels;  // from fine to coarse, each half as large, rounded up
+    bool repeats_x = false, repeats_y = false;  // else the border's texel goes on
+
+    // place: (0, 0) is the table's first corner, (1, 1) its last; texels hold at their centres.
+    // Of the levels whose texels are as wide as `footprint` (the larger side in texels counts),
+    // cubic within a level (Catmull, Rom): slopes are continuous, so a finer grid always has a
+    // smoother surface.
+    DVec3 at(DVec2 place, DVec2 footprint) const;
+};
+
+// texels: width * height, finite.
+GridTable makeGridTable(int width, int height, std::vector<Vec3> texels);
+
+}  // namespace stipple
