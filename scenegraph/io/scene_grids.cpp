@@ -203,9 +203,9 @@ void warnOfGrid(SceneReader& reader, const UvGrid& grid, bool is_given, const Js
         reader.where(path),
         "the displaced surface pulls apart: at u " + shortNumber(stretch.u, "%.3f") + ", v " +
             shortNumber(stretch.v, "%.3f") + " it is stretched " +
-            shortNumber(stretch.most, "%.3g") + " times as much on one side as on another, and " +
-            shortNumber(100.0 * stretch.share, "%.2g") + " % of the grid are so by more than " +
-            shortNumber(kMostStretch, "%.0f") +
+            shortNumber(stretch.most, "%.3g") + " times as much as beside, and at " +
+            shortNumber(100.0 * stretch.share, "%.2g") + " % of the grid's edges more than " +
+            shortNumber(kMostStretch, "%.0f") + " times" +
             "; \"refine\", a larger \"resolution\" or a smoother table help");
 }
 

@@ -4,6 +4,7 @@
 #include <scenegraph/procedural/uv_grid_lattice.h>
 
 #include <array>
+#include <tuple>
 #include <unordered_map>
 
 namespace stipple {
@@ -12,9 +13,9 @@ namespace {
 
 constexpr int kCurvedCells = 128;  // along curved sides, without tables
 constexpr double kMostTriangles = 5e7;
-// An edge is halved where its halves differ by this much of its length: bent by 29 degrees, or one
-// half 1.7 times as long as the other.
-constexpr double kMostDifference = 0.25;
+// An edge is halved where two of its quarters differ by this much of its length: where it bends by
+// more than about 30 degrees, or one part is stretched twice as much as another.
+constexpr double kMostDifference = 0.2;
 
 class UvGridBuilder {
 public:
@@ -53,8 +54,7 @@ public:
         std::vector<UVec3> finer;
         finer.reserve(triangles_.size());
         const auto middleOf = [&](uint32_t a, uint32_t b) {
-            const uint64_t edge = uint64_t(std::min(a, b)) << 32 | std::max(a, b);
-            const auto [it, is_new] = middles.try_emplace(edge, kNone);
+            const auto [it, is_new] = middles.try_emplace(edgeOf(a, b), kNone);
             if (is_new) it->second = halve(a, b);
             return it->second;
         };
@@ -73,8 +73,6 @@ public:
     }
 
     GridStretch measureStretch() const {
-        // Least and most of the triangles at each vertex. What is compressed counts as unstretched.
-        std::vector<float> least(vertices_.size(), kInfinity), most(vertices_.size(), 0.0f);
         std::vector<DVec3> base(vertices_.size());
         forEachVertex([&](size_t k) {
             const Lattice& at = vertices_[k];
@@ -83,23 +81,34 @@ public:
         double whole = 0.0;
         for (const UVec3& t : triangles_) whole += doubleArea(base, t);
         const double tiny = 1e-9 * whole / double(std::max<size_t>(triangles_.size(), 1));
+        struct Side {
+            uint64_t edge;
+            float stretch;
+        };
+        std::vector<Side> sides;
+        sides.reserve(3 * triangles_.size());
         for (const UVec3& t : triangles_) {
             const double flat = doubleArea(base, t);
             if (!(flat > tiny)) continue;
+            // What is compressed does not pull apart.
             const float stretch = float(std::max(doubleArea(positions_, t) / flat, 1.0));
-            for (int k = 0; k < 3; ++k) {
-                least[t[k]] = std::min(least[t[k]], stretch);
-                most[t[k]] = std::max(most[t[k]], stretch);
-            }
+            for (int k = 0; k < 3; ++k) sides.push_back({edgeOf(t[k], t[(k + 1) % 3]), stretch});
         }
+        parallelSort(pool_, sides, [](const Side& a, const Side& b) {
+            return std::tie(a.edge, a.stretch) < std::tie(b.edge, b.stretch);
+        });
         GridStretch result;
-        for (size_t k = 0; k < vertices_.size(); ++k) {
-            const double ratio = most[k] > 0.0f ? double(most[k]) / double(least[k]) : 1.0;
-            if (ratio > kMostStretch) result.share += 1.0 / double(vertices_.size());
+        size_t n_edges = 0, n_stretched = 0;
+        for (size_t i = 0; i + 1 < sides.size(); ++i) {
+            if (sides[i].edge != sides[i + 1].edge) continue;
+            const double ratio = double(sides[i + 1].stretch) / double(sides[i].stretch);
+            ++n_edges, n_stretched += ratio > kMostStretch;
             if (ratio <= result.most) continue;
             result.most = ratio;
-            result.u = us_.at(vertices_[k].i), result.v = vs_.at(vertices_[k].j);
+            const Lattice& at = vertices_[size_t(sides[i].edge >> 32)];
+            result.u = us_.at(at.i), result.v = vs_.at(at.j);
         }
+        result.share = double(n_stretched) / double(std::max<size_t>(n_edges, 1));
         return result;
     }
 
@@ -142,6 +151,9 @@ private:
     DVec3 positionAt(const Lattice& at) const {
         return surface_.position(us_.at(at.i), vs_.at(at.j));
     }
+    static uint64_t edgeOf(uint32_t a, uint32_t b) {
+        return uint64_t(std::min(a, b)) << 32 | std::max(a, b);
+    }
     static double doubleArea(const std::vector<DVec3>& positions, const UVec3& t) {
         return glm::length(
             glm::cross(positions[t.y] - positions[t.x], positions[t.z] - positions[t.x]));
@@ -159,17 +171,26 @@ private:
         }
     }
 
-    // The new vertex in the middle of an edge whose halves differ too much. Depends on the edge
+    // The new vertex in the middle of an edge whose parts differ too much. Depends on the edge
     // alone, and on both sides of a seam it is the same.
     uint32_t halve(uint32_t a, uint32_t b) {
-        const Lattice middle{(vertices_[a].i + vertices_[b].i) / 2,
-                             (vertices_[a].j + vertices_[b].j) / 2};
-        const DVec3 p = positionAt(middle);
-        const double difference = glm::length(2.0 * p - positions_[a] - positions_[b]);
-        if (!(difference > kMostDifference * glm::distance(positions_[a], positions_[b])))
-            return kNone;
-        vertices_.push_back(middle);
-        positions_.push_back(p);
+        const Lattice from = vertices_[a], to = vertices_[b];
+        DVec3 at[5] = {positions_[a], {}, {}, {}, positions_[b]};
+        for (int k = 1; k < 4; ++k) {
+            const double share = 0.25 * k;
+            at[k] = surface_.position(us_.at(from.i + (to.i - from.i) * share),
+                                      vs_.at(from.j + (to.j - from.j) * share));
+        }
+        double difference = 0.0;
+        for (int k = 0; k < 4; ++k) {
+            for (int l = 0; l < k; ++l) {
+                difference =
+                    std::max(difference, glm::length((at[k + 1] - at[k]) - (at[l + 1] - at[l])));
+            }
+        }
+        if (!(difference > kMostDifference * glm::distance(at[0], at[4]))) return kNone;
+        vertices_.push_back({(from.i + to.i) / 2, (from.j + to.j) / 2});
+        positions_.push_back(at[2]);
         return uint32_t(vertices_.size() - 1);
     }
 

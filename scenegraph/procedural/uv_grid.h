@@ -39,12 +39,12 @@ struct UvGridParams {
 inline constexpr double kMostCells = 1 << 20;
 inline constexpr int kMostRefine = 6;
 
-// How unevenly tables have stretched the surface: how many times as much a triangle is as another
-// at the same vertex. Above kMostStretch it shows: light and texture change from cell to cell.
+// How unevenly tables have stretched the surface: how many times as much a triangle as the one
+// beside it. Above kMostStretch it shows: light and texture change from cell to cell.
 struct GridStretch {
     double most = 1.0;
     double u = 0.0, v = 0.0;  // where
-    double share = 0.0;       // of the vertices: above kMostStretch
+    double share = 0.0;       // of the edges: above kMostStretch
 };
 inline constexpr double kMostStretch = 4.0;
 

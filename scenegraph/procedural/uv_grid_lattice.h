@@ -2,6 +2,7 @@
 // Where a grid's lines lie along u or v. Internal.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -31,16 +32,16 @@ public:
     int cellCount() const { return int(lines_.size()) - 1; }
     int stepsPerCell() const { return steps_; }
     double finestStep() const { return finest_; }
-    // Of a step's number, 0..cellCount() * stepsPerCell().
-    double unwrapped(int step) const {
-        const size_t cell = size_t(step / steps_);
-        const double share = double(step % steps_) / steps_;
-        return share > 0.0 ? lines_[cell] + (lines_[cell + 1] - lines_[cell]) * share
-                           : lines_[cell];
+    // At a number of steps, 0..cellCount() * stepsPerCell().
+    double unwrapped(double step) const {
+        const size_t cell = std::min(size_t(step / steps_), lines_.size() - 2);
+        const double share = step / steps_ - double(cell);
+        return share < 1.0 ? lines_[cell] + (lines_[cell + 1] - lines_[cell]) * share
+                           : lines_[cell + 1];
     }
     // Where a closed side ends it is exactly where it began.
-    double at(int step) const {
-        return unwrapped(is_closed_ && step == cellCount() * steps_ ? 0 : step);
+    double at(double step) const {
+        return unwrapped(is_closed_ && step == cellCount() * steps_ ? 0.0 : step);
     }
 
 private:
