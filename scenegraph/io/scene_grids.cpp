@@ -77,7 +77,7 @@ UvGridParams readParams(SceneReader& reader, const Json& asset, const JsonPath& 
         params.cells_v = (it->is_array() ? (*it)[1] : *it).get<int>();
     }
     readMember(asset, "refine", params.refine);
-    params.has_tangents = asset.contains("normal_map");
+    params.has_normal_map = asset.contains("normal_map");
     params.reserve = [&reader, where = reader.where(path)](double triangles) {
         reader.context.throwIfCancelled();
         reader.context.budget.take(triangles * (kBytesPerTriangle + 0.5 * kBytesPerVertex), where,
@@ -97,16 +97,32 @@ UvGridParams readParams(SceneReader& reader, const Json& asset, const JsonPath& 
     return params;
 }
 
+// Along which sides pictures repeat: where the surface closes on itself they do.
+struct Repeats {
+    bool u, v;
+    Repeats(const UvGridParams& params) {
+        const GridSurfaceInfo& info = gridSurface(params.shape.surface);
+        u = info.is_closed_u || params.texture_repeat.x != 1.0;
+        v = info.is_closed_v || params.texture_repeat.y != 1.0;
+    }
+    void applyTo(Texture& texture) const {
+        texture.wrap_u = u ? Wrap::kRepeat : Wrap::kClamp;
+        texture.wrap_v = v ? Wrap::kRepeat : Wrap::kClamp;
+    }
+};
+
 int readTexture(SceneReader& reader, const Json& asset, const char* key, bool is_srgb,
-                const JsonPath& path) {
+                const Repeats& repeats, const JsonPath& path) {
     const JsonPath file_path = joined(path, {key});
-    return addTexture(reader.scene, reader.file(asset[key], file_path), is_srgb, false,
-                      reader.context, reader.where(file_path));
+    const int index = addTexture(reader.scene, reader.file(asset[key], file_path), is_srgb, false,
+                                 reader.context, reader.where(file_path));
+    repeats.applyTo(reader.scene.textures[size_t(index)]);
+    return index;
 }
 
 // Multiplies the texture's alpha with the table's, at the finer of both resolutions.
 void multiplyAlpha(SceneReader& reader, Texture& texture, const GridTable& alpha,
-                   const std::string& where) {
+                   const Repeats& repeats, const std::string& where) {
     const GridTable::Level& finest = alpha.levels[0];
     Texture::Level level{std::max(texture.levels[0].width, finest.width),
                          std::max(texture.levels[0].height, finest.height),
@@ -120,7 +136,8 @@ void multiplyAlpha(SceneReader& reader, Texture& texture, const GridTable& alpha
             const DVec2 place((x + 0.5) / level.width, (y + 0.5) / level.height);
             const Vec4 color = sampleTexture(texture, Vec2(place), 0.0f);
             for (int c = 0; c < 3; ++c) level.rgba.push_back(toByte(srgbFromLinear(color[c])));
-            level.rgba.push_back(toByte(color.a * float(alpha.at(place, DVec2(0.0)).x)));
+            level.rgba.push_back(
+                toByte(color.a * float(alpha.at(place, DVec2(0.0), repeats.u, repeats.v).x)));
         }
     }
     texture.levels = {std::move(level)};
@@ -138,11 +155,12 @@ Material readMaterial(SceneReader& reader, const Json& asset, const UvGridParams
     float specular = 0.0f;
     readMember(asset, "specular", specular);
     material.specular = Vec3(specular);
-    const bool is_body = info.is_closed_u && (info.is_closed_v || info.name == "sphere");
-    material.double_sided = !is_body;
-    const size_t first = reader.scene.textures.size();
+    // What has no outside.
+    material.double_sided = info.name == "helicoid" || info.name == "mobius";
+    readMember(asset, "double_sided", material.double_sided);
+    const Repeats repeats(params);
     if (asset.contains("texture"))
-        material.base_texture = readTexture(reader, asset, "texture", true, path);
+        material.base_texture = readTexture(reader, asset, "texture", true, repeats, path);
     if (asset.contains("alpha_map")) {
         const JsonPath alpha_path = joined(path, {"alpha_map"});
         const GridTable alpha =
@@ -151,10 +169,11 @@ Material readMaterial(SceneReader& reader, const Json& asset, const UvGridParams
             Texture white;
             white.name = "alpha";
             white.levels.push_back({1, 1, {255, 255, 255, 255}});
+            repeats.applyTo(white);
             material.base_texture = int(reader.scene.textures.size());
             reader.scene.textures.push_back(std::move(white));
         }
-        multiplyAlpha(reader, reader.scene.textures[size_t(material.base_texture)], alpha,
+        multiplyAlpha(reader, reader.scene.textures[size_t(material.base_texture)], alpha, repeats,
                       reader.where(alpha_path));
     }
     if (material.base_texture != kNoTexture) {
@@ -165,19 +184,13 @@ Material readMaterial(SceneReader& reader, const Json& asset, const UvGridParams
         if (!is_opaque) {
             material.alpha_mode =
                 asset.contains("alpha_cutoff") ? AlphaMode::kMask : AlphaMode::kBlend;
-            material.double_sided = true;
         }
     }
     readMember(asset, "alpha_cutoff", material.alpha_cutoff);
     if (asset.contains("normal_map")) {
-        material.normal_map.texture = readTexture(reader, asset, "normal_map", false, path);
+        material.normal_map.texture =
+            readTexture(reader, asset, "normal_map", false, repeats, path);
         readMember(asset, "normal_scale", material.normal_scale);
-    }
-    // Where a side closes on itself its pictures do.
-    for (size_t i = first; i < reader.scene.textures.size(); ++i) {
-        Texture& texture = reader.scene.textures[i];
-        if (!info.is_closed_u && params.texture_repeat.x == 1.0) texture.wrap_u = Wrap::kClamp;
-        if (!info.is_closed_v && params.texture_repeat.y == 1.0) texture.wrap_v = Wrap::kClamp;
     }
     return material;
 }
@@ -195,7 +208,8 @@ void warnOfGrid(SceneReader& reader, const UvGrid& grid, bool is_given, const Js
             reader.where(path), "the tables have " + cells(grid.table_cells_u, grid.table_cells_v) +
                                     " texels and the grid only " +
                                     cells(grid.cells_u, grid.cells_v) +
-                                    " cells, unless \"resolution\" or \"refine\" ask for more");
+                                    " cells: what is finer is seen by its normals alone, unless "
+                                    "\"resolution\" or \"refine\" ask for more");
     }
     const GridStretch& stretch = grid.stretch;
     if (!(stretch.most > kMostStretch)) return;
@@ -216,9 +230,16 @@ ChildRef readGrid(SceneReader& reader, const std::string& name, const Json& asse
     const UvGridParams params = readParams(reader, asset, path);
     UvGrid grid = makeUvGrid(params, reader.pool);
     warnOfGrid(reader, grid, asset.contains("resolution"), path);
+    Material material = readMaterial(reader, asset, params, path);
+    if (!params.has_normal_map && grid.isCoarserThanTables()) {
+        const glm::ivec2 size = detailSize(grid);
+        reader.context.budget.take(double(size.x) * size.y * 4.0 * 1.34, reader.where(path),
+                                   "the texels of a normal map");
+        material.normal_map = {int(reader.scene.textures.size()), 1};
+        reader.scene.textures.push_back(makeDetailNormals(params, grid, reader.pool));
+    }
     grid.mesh.name = oneLine(name);
-    return addModel(reader.scene, std::move(grid.mesh), {readMaterial(reader, asset, params, path)},
-                    reader.where(path));
+    return addModel(reader.scene, std::move(grid.mesh), {std::move(material)}, reader.where(path));
 }
 
 }  // namespace stipple

@@ -112,19 +112,23 @@ public:
         return result;
     }
 
-    Mesh finish() {
+    // is_detailed: for makeDetailNormals().
+    Mesh finish(bool is_detailed) {
         const size_t n = vertices_.size();
+        const bool has_tangents = params_.has_normal_map || is_detailed;
         Mesh mesh;
         mesh.positions.resize(n), mesh.normals.resize(n), mesh.uvs.resize(n);
-        if (params_.has_tangents) mesh.tangents.resize(n);
+        if (has_tangents) mesh.tangents.resize(n);
+        if (is_detailed) mesh.more_uvs.emplace_back(n);
         forEachVertex([&](size_t k) {
             const Lattice& at = vertices_[k];
             DVec3 tangent;
             mesh.positions[k] = Vec3(positions_[k]);
             mesh.normals[k] = Vec3(surface_.normal(us_.at(at.i), vs_.at(at.j), tangent));
-            mesh.uvs[k] = Vec2(DVec2(us_.unwrapped(at.i), 1.0 - vs_.unwrapped(at.j)) *
-                               params_.texture_repeat);
-            if (params_.has_tangents) mesh.tangents[k] = Vec4(Vec3(tangent), 1.0f);
+            const DVec2 uv(us_.unwrapped(at.i), 1.0 - vs_.unwrapped(at.j));
+            mesh.uvs[k] = Vec2(uv * params_.texture_repeat);
+            if (is_detailed) mesh.more_uvs[0][k] = Vec2(uv);
+            if (has_tangents) mesh.tangents[k] = Vec4(Vec3(tangent), 1.0f);
         });
         mesh.triangles = std::move(triangles_);
         mesh.triangle_material.assign(mesh.triangles.size(), 0);
@@ -251,18 +255,14 @@ void checkRepeat(DVec2 repeat, const GridSurfaceInfo& info) {
 
 }  // namespace
 
-UvGrid makeUvGrid(UvGridParams params, ThreadPool& pool) {
+UvGrid makeUvGrid(const UvGridParams& params, ThreadPool& pool) {
     const GridSurfaceInfo& info = gridSurface(params.shape.surface);
     if (params.refine < 0 || params.refine > kMostRefine) {
         throw Error(ErrorCode::kInvalidArgument, "",
                     "refine must be in 0.." + std::to_string(kMostRefine));
     }
     checkRepeat(params.texture_repeat, info);
-    for (GridDisplacement& d : params.displacements) {
-        checkRepeat(d.repeat, info);
-        d.table.repeats_x = info.is_closed_u || d.repeat.x != 1.0;
-        d.table.repeats_y = info.is_closed_v || d.repeat.y != 1.0;
-    }
+    for (const GridDisplacement& d : params.displacements) checkRepeat(d.repeat, info);
     UvGrid grid;
     grid.table_cells_u = tableCells(params, 0), grid.table_cells_v = tableCells(params, 1);
     double u = GridLattice::wantedCells(grid.table_cells_u, info.is_curved_u ? kCurvedCells : 1),
@@ -279,11 +279,12 @@ UvGrid makeUvGrid(UvGridParams params, ThreadPool& pool) {
     }
     const GridLattice us(grid.cells_u, grid.table_cells_u, info.is_closed_u, params.refine),
         vs(grid.cells_v, grid.table_cells_v, info.is_closed_v, params.refine);
+    grid.finest_cell = DVec2(us.finestStep(), vs.finestStep());
     UvGridBuilder builder(params, us, vs, pool);
     builder.makeCells();
     for (int pass = 0; pass < params.refine; ++pass) builder.refine();
     grid.stretch = builder.measureStretch();
-    grid.mesh = builder.finish();
+    grid.mesh = builder.finish(!params.has_normal_map && grid.isCoarserThanTables());
     return grid;
 }
 

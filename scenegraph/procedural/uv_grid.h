@@ -4,11 +4,12 @@
 // surface pulls apart, 5 conversion of geometries).
 //
 // Vertices lie where the tables' texels do, or at the mip level of a coarser grid, so the mesh
-// shows all that the tables say at its resolution, and points, rays, z-buffer, shadows and picking
-// meet on one surface. Points are then drawn by area: their density over u and v is the Jacobian
-// determinant, and no stretch of cells makes them sparse.
+// shows all that the tables say at its resolution, its normals what they say beyond, and points,
+// rays, z-buffer, shadows and picking meet on one surface. Points are then drawn by area: their
+// density over u and v is the Jacobian determinant, and no stretch of cells makes them sparse.
 #pragma once
 
+#include <core/material.h>
 #include <core/parallel.h>
 #include <scenegraph/mesh.h>
 #include <scenegraph/procedural/uv_grid_surface.h>
@@ -20,7 +21,7 @@ namespace stipple {
 
 struct GridDisplacement {
     enum class Along { kNormal, kSurface, kObject };
-    GridTable table;               // metres; its wrapping is set by makeUvGrid()
+    GridTable table;               // metres
     Along along = Along::kNormal;  // x alone along the normal; or x, y, z: along u, v and the
                                    // normal; or along the object's axes
     DVec2 repeat = DVec2(1.0);     // times along u and v
@@ -30,7 +31,7 @@ struct UvGridParams {
     GridShape shape;
     std::vector<GridDisplacement> displacements;  // added up
     DVec2 texture_repeat = DVec2(1.0);
-    bool has_tangents = false;     // for normal maps
+    bool has_normal_map = false;   // the mesh needs tangents
     int cells_u = 0, cells_v = 0;  // 0: as many as the tables have texels, kMostCells in all
     int refine = 0;                // cells are halved up to so many times where the surface
                                    // bends or stretches, kMostRefine at most
@@ -53,6 +54,12 @@ struct UvGrid {
     GridStretch stretch;
     int cells_u = 0, cells_v = 0;              // before refinement
     int table_cells_u = 0, table_cells_v = 0;  // what the tables have
+    DVec2 finest_cell = DVec2(1.0);            // after refinement, in u and v
+
+    bool isCoarserThanTables() const {
+        return finest_cell.x * table_cells_u > 1.0 + 1e-9 ||
+               finest_cell.y * table_cells_v > 1.0 + 1e-9;
+    }
 };
 
 // The surface with its tables, for any u and v. params must outlive it.
@@ -78,7 +85,17 @@ private:
     bool pole_bottom_ = false, pole_top_ = false;  // all of u is one point there
 };
 
-// Throws kInvalidArgument. The same for any number of threads.
-UvGrid makeUvGrid(UvGridParams params, ThreadPool& pool);
+// Throws kInvalidArgument. The same for any number of threads. Where the tables are finer than the
+// grid and there is no normal map, the mesh has tangents, and a second layer of texture
+// coordinates, without repeats, for makeDetailNormals().
+UvGrid makeUvGrid(const UvGridParams& params, ThreadPool& pool);
+
+// Texels of makeDetailNormals(): those of the tables, kMostDetail along a side at most.
+glm::ivec2 detailSize(const UvGrid& grid);
+inline constexpr int kMostDetail = 4096;
+
+// What the tables say beyond the grid's resolution, as a normal map (tangent space, as glTF has
+// it).
+Texture makeDetailNormals(const UvGridParams& params, const UvGrid& grid, ThreadPool& pool);
 
 }  // namespace stipple

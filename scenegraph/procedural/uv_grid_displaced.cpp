@@ -19,7 +19,9 @@ DisplacedSurface::DisplacedSurface(const UvGridParams& params, DVec2 footprint)
 DVec3 DisplacedSurface::offset(const GridPlace& place, double u, double v) const {
     DVec3 sum(0.0);
     for (const GridDisplacement& d : params_.displacements) {
-        const DVec3 metres = d.table.at(DVec2(u, 1.0 - v) * d.repeat, footprint_ * d.repeat);
+        const DVec3 metres = d.table.at(DVec2(u, 1.0 - v) * d.repeat, footprint_ * d.repeat,
+                                        info_.is_closed_u || d.repeat.x != 1.0,
+                                        info_.is_closed_v || d.repeat.y != 1.0);
         switch (d.along) {
             case GridDisplacement::Along::kNormal:
                 sum += place.normal * metres.x;

@@ -24,13 +24,13 @@ struct Cubic {
     }
 };
 
-DVec3 sampleLevel(const GridTable& table, const GridTable::Level& level, DVec2 place) {
+DVec3 sampleLevel(const GridTable::Level& level, DVec2 place, bool repeats_x, bool repeats_y) {
     const Cubic x(place.x * level.width - 0.5), y(place.y * level.height - 0.5);
     DVec3 sum(0.0);
     for (int j = 0; j < 4; ++j) {
-        const int row = wrapTexel(y.first + j, level.height, table.repeats_y);
+        const int row = wrapTexel(y.first + j, level.height, repeats_y);
         for (int i = 0; i < 4; ++i) {
-            const int column = wrapTexel(x.first + i, level.width, table.repeats_x);
+            const int column = wrapTexel(x.first + i, level.width, repeats_x);
             sum += DVec3(level.texels[size_t(row) * size_t(level.width) + size_t(column)]) *
                    (x.weight[i] * y.weight[j]);
         }
@@ -68,13 +68,15 @@ GridTable::Level halve(const GridTable::Level& fine) {
 
 }  // namespace
 
-DVec3 GridTable::at(DVec2 place, DVec2 footprint) const {
+DVec3 GridTable::at(DVec2 place, DVec2 footprint, bool repeats_x, bool repeats_y) const {
     const double texels = std::max(footprint.x * levels[0].width, footprint.y * levels[0].height);
     const double level = std::clamp(std::log2(std::max(texels, 1.0)), 0.0, levels.size() - 1.0);
     const size_t below = size_t(level);
-    const DVec3 fine = sampleLevel(*this, levels[below], place);
+    const auto sample = [&](size_t l) {
+        return sampleLevel(levels[l], place, repeats_x, repeats_y);
+    };
     const double share = level - double(below);
-    return share > 0.0 ? glm::mix(fine, sampleLevel(*this, levels[below + 1], place), share) : fine;
+    return share > 0.0 ? glm::mix(sample(below), sample(below + 1), share) : sample(below);
 }
 
 GridTable makeGridTable(int width, int height, std::vector<Vec3> texels) {

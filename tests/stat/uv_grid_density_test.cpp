@@ -40,8 +40,6 @@ TEST_P(UvGridDensity, followsTheJacobian) {
     UvGrid grid = makeUvGrid(params, pool);
     Mesh& mesh = grid.mesh;
     buildMesh(mesh, {Material()}, "test");
-    params.displacements[0].table.repeats_x = gridSurface(GetParam()).is_closed_u;
-    params.displacements[0].table.repeats_y = gridSurface(GetParam()).is_closed_v;
     const DisplacedSurface surface(params, DVec2(0.0));
     const std::vector<double> areas = binAreas(surface);
     double whole = 0.0;

@@ -2,7 +2,9 @@
 // Grids: surfaces, tables, the mesh between, where it is stretched, refined and closed.
 #include <core/error.h>
 #include <gtest/gtest.h>
+#include <scenegraph/surface_at.h>
 
+#include <array>
 #include <map>
 
 #include "uv_grid_samples.h"
@@ -53,14 +55,15 @@ TEST(UvGridTable, saysWhatItsTexelsSayAndCoarselyTheirMean) {
     for (int y = 0; y < 5; ++y) {
         for (int x = 0; x < 7; ++x) {
             const DVec2 place((x + 0.5) / 7, (y + 0.5) / 5);
-            EXPECT_NEAR(table.at(place, DVec2(0.0)).x, 3.0 * place.x - place.y * place.y, 1e-6);
+            EXPECT_NEAR(table.at(place, DVec2(0.0), false, false).x,
+                        3.0 * place.x - place.y * place.y, 1e-6);
             mean += (3.0 * place.x - place.y * place.y) / 35.0;
         }
     }
-    EXPECT_NEAR(table.at(DVec2(0.2, 0.9), DVec2(10.0)).x, mean, 1e-6);
+    EXPECT_NEAR(table.at(DVec2(0.2, 0.9), DVec2(10.0), false, false).x, mean, 1e-6);
     // Cubic: exact for lines between texels, and no step in the slope at a texel.
-    EXPECT_NEAR(table.at(DVec2(0.5 + 0.3 / 7, 0.5), DVec2(0.0)).x, 3.0 * (0.5 + 0.3 / 7) - 0.25,
-                1e-5);
+    EXPECT_NEAR(table.at(DVec2(0.5 + 0.3 / 7, 0.5), DVec2(0.0), false, false).x,
+                3.0 * (0.5 + 0.3 / 7) - 0.25, 1e-5);
 }
 
 // Every vertex of a grid with the table's own number of cells lies on a texel.
@@ -121,6 +124,40 @@ TEST(UvGrid, normalsAreThoseOfTheDisplacedSurface) {
     }
 }
 
+// A coarse grid is lit as a fine one is.
+TEST(UvGrid, detailBeyondItsCellsIsInItsNormalMap) {
+    for (const char* surface : {"plane", "torus", "sphere"}) {
+        UvGridParams params = rippled(surface, 0.01);
+        params.cells_u = params.cells_v = 40;
+        ThreadPool pool(2);
+        UvGrid grid = makeUvGrid(params, pool);
+        ASSERT_TRUE(grid.isCoarserThanTables());
+        EXPECT_EQ(detailSize(grid), glm::ivec2(96, 48));
+        const std::vector<Texture> textures = {makeDetailNormals(params, grid, pool)};
+        std::vector<Material> plain(1), mapped(1);
+        mapped[0].normal_map = {0, 1};
+        const DisplacedSurface exact(params, DVec2(1.0 / 96, 1.0 / 48));
+        double error = 0.0, plain_error = 0.0;
+        for (uint32_t t = 0; t < grid.mesh.triangles.size(); ++t) {
+            const auto& layer = grid.mesh.more_uvs[0];
+            const UVec3& corners = grid.mesh.triangles[t];
+            const DVec2 uv((layer[corners.x] + layer[corners.y] + layer[corners.z]) / 3.0f);
+            if (uv.y < 0.1 || uv.y > 0.9) continue;
+            DVec3 tangent;
+            const Vec3 expected(exact.normal(uv.x, 1.0 - uv.y, tangent));
+            const auto at = [&](const std::vector<Material>& materials) {
+                return surfaceAt(grid.mesh, materials, textures, t, 1 / 3.0f, 1 / 3.0f, {})
+                    .normal_object;
+            };
+            error += double(glm::distance(at(mapped), expected));
+            plain_error += double(glm::distance(at(plain), expected));
+        }
+        EXPECT_LT(error, 0.2 * plain_error) << surface;
+        params.cells_u = 96, params.cells_v = 48;
+        EXPECT_FALSE(makeUvGrid(params, pool).isCoarserThanTables());
+    }
+}
+
 // How often the edges of the mesh, by positions, belong to one triangle only, or to more than two.
 size_t openEdges(const Mesh& mesh) {
     std::map<std::array<float, 3>, uint32_t> ids;
@@ -172,7 +209,7 @@ TEST(UvGrid, tellsWhereItPullsApartAndRefinementHeals) {
 TEST(UvGrid, isTheSameForAnyNumberOfThreads) {
     UvGridParams params = rippled("torus", 0.1);
     params.refine = 2;
-    params.has_tangents = true;
+    params.has_normal_map = true;
     ThreadPool one(1), seven(7);
     const Mesh a = makeUvGrid(params, one).mesh, b = makeUvGrid(params, seven).mesh;
     EXPECT_EQ(a.positions, b.positions);
