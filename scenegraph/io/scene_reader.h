@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of reading a scene file: assets (scene_assets.cpp, scene_grids.cpp), groups (scene_groups.cpp), lights
-// (scene_lights.cpp), the rest (scene_file.cpp). Internal.
+// The parts of reading a scene file: assets (scene_assets.cpp, scene_grids.cpp), groups
+// (scene_groups.cpp), lights (scene_lights.cpp), the rest (scene_file.cpp). Internal.
 #pragma once
 
 #include <core/parallel.h>
