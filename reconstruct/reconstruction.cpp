@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/reconstruction.h>
 
+#include <reconstruct/bins.h>
 #include <reconstruct/depth_pass.h>
 #include <reconstruct/ewa.h>
 #include <reconstruct/gaussian.h>
@@ -14,8 +15,9 @@ namespace stipple {
 
 RenderSettings drawnSettings(const RenderSettings& settings) {
     RenderSettings drawn = settings;
-    const bool uses_all =
-        settings.reconstruct == Reconstruct::kGaussian || settings.reconstruct == Reconstruct::kEwa;
+    const bool uses_all = settings.reconstruct == Reconstruct::kGaussian ||
+                          settings.reconstruct == Reconstruct::kEwa ||
+                          settings.reconstruct == Reconstruct::kBins;
     if (settings.method != Method::kPoints || !uses_all) return drawn;
     constexpr int kMostSubpixels = 4;
     const int most = std::max(1, kMostSubpixels / settings.subpixels);
@@ -47,6 +49,8 @@ std::unique_ptr<TileReconstruction> makeReconstruction(const ReconstructionConte
             return makePullPush(context);
         case Reconstruct::kEwa:
             return makeEwa(context);
+        case Reconstruct::kBins:
+            return makeBins(context);
         case Reconstruct::kPerPixel:
             break;
     }

@@ -3,6 +3,8 @@
 
 #include <core/rng.h>
 
+#include <algorithm>
+
 namespace stipple {
 
 namespace {
@@ -29,6 +31,11 @@ SeenMesh seeMesh(TileContext& context, const InstanceFrame& frame, uint32_t mesh
                  const RunDensity& density) {
     const Mesh& mesh = context.scene.meshes[mesh_index];
     if (!drawsWhatIsSeen(context.settings) || !hidesItself(mesh)) return SeenMesh();
+    // Blended surfaces do not hide what lies behind them.
+    const auto isBlended = [](const Stratum& stratum) { return stratum.blended; };
+    if (drawsLayers(context.settings) &&
+        std::any_of(mesh.strata.begin(), mesh.strata.end(), isBlended))
+        return SeenMesh();
     const View& view = context.view;
     const DVec3 center(mesh.bounds.center());
     const DVec3 to_eye = view.orthographic ? -frame.facing : frame.eye_object - center;

@@ -53,7 +53,10 @@ inline NodeClass classifyNode(const Mesh& mesh, const MeshNode& node, const BoxP
     if (is_mixed) return NodeClass::kOpen;  // never a leaf
     // What is large at the far end of the box is large everywhere in it.
     const double far_largest = largest / (box.depth_ratio * box.depth_ratio);
-    if ((is_leaf ? largest : far_largest) > settings.large_triangle) {
+    // The z-buffer keeps one layer. Triangles that reach behind the eye it alone can clip.
+    const bool keeps_layers = drawsLayers(settings) && mesh.strata[node.stratum].blended &&
+                              box.depth_ratio < std::numeric_limits<double>::infinity();
+    if (!keeps_layers && (is_leaf ? largest : far_largest) > settings.large_triangle) {
         const bool is_short = is_leaf || box.is_inside || node.triangle_count <= kCullTriangles;
         return is_short ? NodeClass::kLargeTriangles : NodeClass::kOpen;
     }

@@ -17,6 +17,7 @@ LookupBeam subpixelBeam(const View& view, float sub_x, float sub_y, float depth,
 void pointAttributes(const Scene& scene, const View& view, const Run& run, const ListBlock& list,
                      int lane, float sub_x, float sub_y, SurfaceSample& sample) {
     sample.material = list.material[lane];
+    sample.alpha = float(list.alpha[lane]) / 255.0f;
     sample.patch_width = patchWidth(list.width[lane], kFirstMetreExponent) * run.length_scale;
     const Material& material = scene.materials[sample.material];
     uint64_t path = run.path;
@@ -52,6 +53,7 @@ void pointAttributes(const Scene& scene, const View& view, const Run& run, const
         normal_camera = camera_from_normal * surface.normal_object;
         sample.albedo = surface.albedo;
         sample.finish = surface.finish;
+        if (list.alpha[lane] < 255) sample.alpha = surface.alpha;
     } else {
         normal_camera = run.camera_from_normal * unpackOctahedral(list.normal_or_triangle[lane]);
         sample.albedo = unpackSrgb8(list.albedo_or_place[lane]);

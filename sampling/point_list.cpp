@@ -302,6 +302,7 @@ struct Point {
     MeshPoint at;
     float patch_width = 0.0f;
     bool single_sided = false;
+    uint8_t alpha = 255;
     uint16_t material = 0;
     uint32_t instance = 0;
     uint8_t levels = 1;
@@ -309,7 +310,7 @@ struct Point {
 
 template <class T>
 Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const std::vector<T>& cumulative_area,
-                    const MeshNode& node, double position, const PointKey& key) {
+                    const MeshNode& node, double position, const PointKey& key, bool layers) {
     const MeshPoint at = meshPointAt(cumulative_area, node, position, key);
     const UVec3& t = mesh.triangles[at.triangle];
     const Vec3 a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a, e2 = mesh.positions[t.z] - a;
@@ -331,9 +332,14 @@ Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const std::vector<T>& 
     bool is_there = true;
     if (material.alpha_mode != AlphaMode::kOpaque) {
         const float alpha = alphaAt(mesh, scene.materials, scene.textures, at.triangle, at.u, at.v);
-        is_there = material.alpha_mode == AlphaMode::kMask
-                       ? alpha >= material.alpha_cutoff
-                       : uniformFloat(hashCombine(key.list, key.index, 3)) < alpha;
+        if (material.alpha_mode == AlphaMode::kMask) {
+            is_there = alpha >= material.alpha_cutoff;
+        } else if (layers) {
+            p.alpha = uint8_t(std::clamp(alpha, 0.0f, 1.0f) * 255.0f + 0.5f);
+            is_there = p.alpha > 0;
+        } else {
+            is_there = uniformFloat(hashCombine(key.list, key.index, 3)) < alpha;
+        }
     }
     if (is_there) p.normal = glm::normalize(glm::cross(DVec3(e1), DVec3(e2)));
     return p;
@@ -359,8 +365,8 @@ void prefilter(const Scene& scene, const Mesh& mesh, Point& p) {
 // Positions known no better than to this share of what they run along are not random there.
 constexpr double kCoarsePosition = 1.0 / 16;
 
-Point makeGroupPoint(const Scene& scene, const Group& outermost, uint32_t node,
-                     const PointKey& key) {
+Point makeGroupPoint(const Scene& scene, const Group& outermost, uint32_t node, const PointKey& key,
+                     bool layers) {
     const Group* group = &outermost;
     InstancePoint at = instanceAt(scene, *group, node, listPosition(key));
     ChildRef child = group->instances.child(at.instance);
@@ -389,7 +395,8 @@ Point makeGroupPoint(const Scene& scene, const Group& outermost, uint32_t node,
     area_scale = std::max(area_scale, 1e-30);
     const Mesh& mesh = scene.meshes[child.index()];
     const float length_scale = float(std::sqrt(area_scale));
-    Point p = makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], at.position, key);
+    Point p =
+        makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], at.position, key, layers);
     if (outermost.depth > 1) prefilter(scene, mesh, p);
     // Drawn for the largest area scale of the transform; this orientation's may be smaller.
     DMat3 area_map = cofactor(group_from_mesh.linear);
@@ -417,6 +424,7 @@ void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
     }
     out.width[lane] = isThere(p) ? patchWidthCode(p.patch_width, kFirstMetreExponent) : kNoPatch;
     out.single_sided[lane] = p.single_sided;
+    out.alpha[lane] = p.alpha;
     out.normal_or_triangle[lane] = p.is_textured ? p.at.triangle : packOctahedral(p.shading_normal);
     out.albedo_or_place[lane] = p.is_textured ? packPlace({p.at.u, p.at.v}) : packSrgb8(p.albedo);
     out.material[lane] = p.material;
@@ -428,6 +436,7 @@ void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
 
 void PointLists::makePoints(const ListName& name, uint32_t first, int count, ListBlock& out) {
     const Box3& box = nodeBounds(scene_, name.child, name.node);
+    const bool layers = identity_.layers;
     const bool is_whole = name.direction == ListName::kWhole;
     PointKey key{identity_.sampler, hashCombine(identity_.seed, name.child.bits, name.node), first};
     if (!is_whole) key.list = hashCombine(key.list, uint64_t(name.direction), 6);
@@ -436,14 +445,15 @@ void PointLists::makePoints(const ListName& name, uint32_t first, int count, Lis
     };
     if (name.child.isGroup()) {
         const Group& group = scene_.groups[name.child.index()];
-        makeAll([&] { return makeGroupPoint(scene_, group, name.node, key); });
+        makeAll([&] { return makeGroupPoint(scene_, group, name.node, key, layers); });
         return;
     }
     const Mesh& mesh = scene_.meshes[name.child.index()];
     const MeshNode& node = mesh.nodes[name.node];
     const auto makeOn = [&](const auto& cumulative_area) {
         makeAll([&] {
-            return makeMeshPoint(scene_, mesh, cumulative_area, node, listPosition(key), key);
+            return makeMeshPoint(scene_, mesh, cumulative_area, node, listPosition(key), key,
+                                 layers);
         });
     };
     if (is_whole) {
@@ -457,7 +467,7 @@ void PointLists::makePoints(const ListName& name, uint32_t first, int count, Lis
         for (uint64_t attempt = 0; attempt < kMaskAttempts && !isThere(p); ++attempt) {
             PointKey k = key;
             if (attempt > 0) k.list = hashCombine(key.list, attempt);
-            p = makeMeshPoint(scene_, mesh, visible.cumulative, node, listPosition(key), k);
+            p = makeMeshPoint(scene_, mesh, visible.cumulative, node, listPosition(key), k, layers);
         }
         p.patch_width = visible.patch_width;
         return p;

@@ -29,6 +29,8 @@ struct ListBlock {
                                                      // alpha mask says there is no surface
     uint8_t width[kBlockPoints];                     // patchWidthCode(), in metres
     uint8_t single_sided[kBlockPoints];              // 1: not seen from behind
+    uint8_t alpha[kBlockPoints];  // of blended surfaces that are drawn in layers, below 255; 255
+                                  // elsewhere
     // Of materials without textures: the shading normal (octahedral, 2 x 16 bits) and the albedo
     // (sRGB-encoded, 8 bits a channel). Of others the triangle and the place on it (packPlace()):
     // what is seen there depends on how far away it is.
@@ -57,6 +59,7 @@ inline constexpr uint32_t kLongestList = 4096;
 struct ListIdentity {
     uint64_t seed = 1;
     Sampler sampler = Sampler::kStratified;
+    bool layers = false;  // blended surfaces have all their points, each with its alpha
     bool operator==(const ListIdentity&) const = default;
 };
 
@@ -80,6 +83,7 @@ public:
     }
     // Call between frames: drops the lists of nodes that have changed, keeps the others.
     void sceneChanged(const SceneChanges& changes);
+    const ListIdentity& identity() const { return identity_; }
     // Call between frames: sets the identity (a new one empties the cache) and the budget. Where
     // it did not suffice, lists that were not used in the last frame are dropped; where it has
     // become smaller than what is there, all are.

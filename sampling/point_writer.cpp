@@ -74,7 +74,10 @@ void PointWriter::add(const InstanceFrame& frame, const ListName& name, const Ru
             context_.lists.points(name, first, int(n), run.list_length, scratch_, lane);
         transformPoints(params, list, lane, first, int(n), context_.nextNumber(), block_.count,
                         block_);
-        if (!density.narrow && context_.sink->wantsSurfels()) {
+        const bool has_blended =
+            context_.lists.identity().layers &&
+            markBlended(list, lane, int(n), context_.sink->wantsLayers(), name, first);
+        if (has_blended || (!density.narrow && context_.sink->wantsSurfels())) {
             const View& view = context_.view;
             makeSurfels({frame.camera_from_normal, float(view.focal), float(density.wanted),
                          view.orthographic},
@@ -86,6 +89,27 @@ void PointWriter::add(const InstanceFrame& frame, const ListName& name, const Ru
         first += n;
         count -= n;
     }
+}
+
+// For sinks that want layers, tells which points are blended, if any; for others drops all but a
+// share alpha of them.
+bool PointWriter::markBlended(const ListBlock& list, int lane, int count, bool wants_layers,
+                              const ListName& name, uint32_t first) {
+    bool has_blended = false;
+    for (int i = 0; i < count; ++i) {
+        const uint8_t alpha = list.alpha[lane + i];
+        uint8_t& keep = block_.keep[block_.count + i];
+        if (alpha == 255 || !keep) continue;
+        if (wants_layers) {
+            keep = kBlended;
+            has_blended = true;
+        } else {
+            const uint64_t key = hashCombine(context_.settings.seed, name.child.bits, name.node,
+                                             uint64_t(first) + uint64_t(i), 10);
+            keep = uniformFloat(key) * 255.0f < float(alpha);
+        }
+    }
+    return has_blended;
 }
 
 uint32_t PointWriter::firstOf(uint64_t path, uint32_t count, uint32_t length) const {

@@ -32,6 +32,9 @@ public:
     void flush();
 
 private:
+    bool markBlended(const ListBlock& list, int lane, int count, bool wants_layers,
+                     const ListName& name, uint32_t first);
+
     TileContext& context_;
     size_t first_run_ = 0;  // of the block
     PointBlock block_;

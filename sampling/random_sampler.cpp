@@ -12,7 +12,8 @@ const FramePlan& RandomizedSampler::plan(const View& view, const RenderSettings&
                                          ThreadPool& pool, const CancelFlag* cancel) {
     view_ = view;
     settings_ = settings;
-    lists_.startFrame({settings.seed, settings.sampler}, size_t(settings.cache_mb) << 20);
+    lists_.startFrame({settings.seed, settings.sampler, drawsLayers(settings)},
+                      size_t(settings.cache_mb) << 20);
     plan_ = planFrame(scene_, view, settings, false, pool, cancel);
     return plan_;
 }

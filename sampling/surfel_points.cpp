@@ -239,6 +239,7 @@ void surfelAttributes(const Scene& scene, const View& view, const Run& run, uint
     const uint32_t finish = bits >> 24;
     sample.material = mesh.first_finish + finish;
     sample.albedo = unpackSrgb8(bits & 0xffffffu);
+    sample.alpha = 1.0f;
     sample.finish = plainFinish(scene.materials[sample.material]);
     sample.patch_width = mesh.surfels->finishes[finish].patch_width * run.length_scale;
     sample.object = objectId(run.path);

@@ -44,6 +44,8 @@ void triangleAttributes(const Scene& scene, const View& view, const InstanceFram
     sample.albedo = surface.albedo;
     sample.finish = surface.finish;
     sample.material = mesh.triangle_material[triangle];
+    sample.alpha =
+        scene.materials[sample.material].alpha_mode == AlphaMode::kBlend ? surface.alpha : 1.0f;
     sample.patch_width = mesh.strata[mesh.triangle_stratum[triangle]].patch_width *
                          float(std::sqrt(frame.area_scale));
     sample.object = objectId(frame.path);
@@ -66,6 +68,7 @@ public:
                                        block_.vertex(2, triangle), origin, direction);
         const float alpha = alphaAt(mesh, scene.materials, scene.textures, t, uv.x, uv.y);
         if (material.alpha_mode == AlphaMode::kMask) return alpha >= material.alpha_cutoff;
+        if (context_.sink->wantsLayers()) return alpha >= kOpaqueAlpha;
         const uint64_t place =
             hashCombine(run_.path, t, uint64_t(int64_t(sub_x)), uint64_t(int64_t(sub_y)));
         return uniformFloat(hashCombine(context_.settings.seed, place)) < alpha;
@@ -89,12 +92,17 @@ void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t tria
         TriangleBlock& block = block_;
         block.count = int(std::min<uint32_t>(kBlockPoints, node.triangle_count - first));
         block.first_number = context_.nextNumber() | kTriangleBit;
+        block.blended = 0;
         for (int i = 0; i < block.count; ++i) {
             const UVec3& t = mesh.triangles[node.first_triangle + first + uint32_t(i)];
             for (int k = 0; k < 3; ++k) {
                 const Vec3 p = linear * mesh.positions[t[k]] + translation;
                 block.x[k][i] = p.x, block.y[k][i] = p.y, block.z[k][i] = p.z;
             }
+        }
+        if (stratum.blended && context_.sink->wantsLayers()) {
+            // A stratum's triangles are all blended.
+            block.blended = ~uint64_t(0) >> (kBlockPoints - block.count);
         }
         Run run;
         run.child = ChildRef::mesh(mesh_index);

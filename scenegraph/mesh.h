@@ -23,6 +23,7 @@ struct Stratum {
     float patch_width = 0.0f;        // object space, m: the mean, weighted by area
     bool double_sided = false;
     bool masked = false;  // has an alpha mask or is blended: the surface may be missing at a point
+    bool blended = false;
 };
 inline constexpr int kMaxStrata = 15;
 

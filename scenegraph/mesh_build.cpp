@@ -139,11 +139,11 @@ std::vector<double> patchWidths(const Mesh& mesh, const std::vector<double>& are
 int areaClass(double area) { return int(std::floor(0.5 * std::log2(std::max(area, 1e-30)))); }
 
 struct StratumKey {
-    bool double_sided, masked;
+    bool double_sided, masked, blended;
     int patch_class, triangle_class;
     bool operator<(const StratumKey& o) const {
-        return std::tie(double_sided, masked, patch_class, triangle_class) <
-               std::tie(o.double_sided, o.masked, o.patch_class, o.triangle_class);
+        return std::tie(double_sided, masked, blended, patch_class, triangle_class) <
+               std::tie(o.double_sided, o.masked, o.blended, o.patch_class, o.triangle_class);
     }
 };
 
@@ -158,7 +158,7 @@ std::map<StratumKey, uint8_t> chooseStrata(const std::map<StratumKey, uint32_t>&
     for (const auto& [key, count] : histogram) entries.push_back({count, {key}});
     const auto mergeable = [](const Entry& a, const Entry& b) {
         return a.keys[0].double_sided == b.keys[0].double_sided &&
-               a.keys[0].masked == b.keys[0].masked;
+               a.keys[0].masked == b.keys[0].masked && a.keys[0].blended == b.keys[0].blended;
     };
     while (entries.size() > 1) {
         size_t best = entries.size();
@@ -304,7 +304,8 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
     for (size_t t = 0; t < kept; ++t) {
         const Material& m = materials[mesh.triangle_material[t]];
         keys[t] = {m.double_sided, m.alpha_mode != AlphaMode::kOpaque,
-                   areaClass(patches[t] * patches[t]), areaClass(areas[t])};
+                   m.alpha_mode == AlphaMode::kBlend, areaClass(patches[t] * patches[t]),
+                   areaClass(areas[t])};
         ++histogram[keys[t]];
     }
     const std::map<StratumKey, uint8_t> strata = chooseStrata(histogram, kept);
@@ -355,6 +356,7 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
         out.max_triangle_area = std::max(out.max_triangle_area, float(areas[t]));
         out.double_sided = sorted_keys[t].double_sided;
         out.masked = sorted_keys[t].masked;
+        out.blended = sorted_keys[t].blended;
         stratum_area[s] += areas[t];
         stratum_patch[s] += areas[t] * sorted_patches[t];
     }

@@ -160,7 +160,9 @@ MeshSurface surfaceAt(const Mesh& mesh, const std::vector<Material>& materials,
                                      mesh.positions[t.z] - mesh.positions[t.x]);
     }
     s.normal_object = mappedNormal(place, material, safeNormalize(s.normal_object));
-    s.albedo = Vec3(baseColor(place, material));
+    const Vec4 color = baseColor(place, material);
+    s.albedo = Vec3(color);
+    s.alpha = color.w;
     s.finish = finishAt(place, material);
     return s;
 }

@@ -12,6 +12,7 @@ namespace stipple {
 struct MeshSurface {
     Vec3 normal_object = Vec3(0);  // unit, shading normal; geometric where the mesh has none
     Vec3 albedo = Vec3(0);         // linear
+    float alpha = 1.0f;
     SurfaceFinish finish;
 };
 

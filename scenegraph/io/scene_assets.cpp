@@ -153,12 +153,25 @@ GeneratedMesh generate(SceneReader& reader, std::mutex& mutex, const std::string
         reader.terrains[name] = std::move(field);
         return result;
     }
+    if (kind == "mist") {
+        MistParams p;
+        readMember(asset, "seed", p.seed);
+        readMember(asset, "radius", p.radius);
+        readMember(asset, "patches", p.patches);
+        readMember(asset, "patch", p.patch);
+        readMember(asset, "depth", p.depth);
+        readVector(asset, "color", p.color);
+        takeTriangles(2.0 * p.patches);
+        return makeMist(p);
+    }
     int triangles = 1000;
+    float alpha = 1.0f;
     Vec3 color(0.8f);
+    readMember(asset, "alpha", alpha);
     readMember(asset, "triangles", triangles);
     readVector(asset, "color", color);
     takeTriangles(triangles);
-    return makePrimitive(kind, triangles, color);
+    return makePrimitive(kind, triangles, color, alpha);
 }
 
 // The heights of a picture's every step-th pixel.

@@ -155,8 +155,10 @@ Material readMaterial(SceneReader& reader, const Json& asset, const UvGridParams
     float specular = 0.0f;
     readMember(asset, "specular", specular);
     material.specular = Vec3(specular);
-    // What has no outside.
-    material.double_sided = info.name == "helicoid" || info.name == "mobius";
+    readMember(asset, "alpha", material.alpha);
+    // What has no outside, or is seen through.
+    material.double_sided =
+        info.name == "helicoid" || info.name == "mobius" || material.alpha < 1.0f;
     readMember(asset, "double_sided", material.double_sided);
     const Repeats repeats(params);
     if (asset.contains("texture"))
@@ -176,15 +178,14 @@ Material readMaterial(SceneReader& reader, const Json& asset, const UvGridParams
         multiplyAlpha(reader, reader.scene.textures[size_t(material.base_texture)], alpha, repeats,
                       reader.where(alpha_path));
     }
+    bool is_opaque = material.alpha == 1.0f;
     if (material.base_texture != kNoTexture) {
         const std::vector<uint8_t>& rgba =
             reader.scene.textures[size_t(material.base_texture)].levels[0].rgba;
-        bool is_opaque = true;
         for (size_t i = 3; i < rgba.size() && is_opaque; i += 4) is_opaque = rgba[i] == 255;
-        if (!is_opaque) {
-            material.alpha_mode =
-                asset.contains("alpha_cutoff") ? AlphaMode::kMask : AlphaMode::kBlend;
-        }
+    }
+    if (!is_opaque) {
+        material.alpha_mode = asset.contains("alpha_cutoff") ? AlphaMode::kMask : AlphaMode::kBlend;
     }
     readMember(asset, "alpha_cutoff", material.alpha_cutoff);
     if (asset.contains("normal_map")) {

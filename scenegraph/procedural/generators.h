@@ -129,8 +129,22 @@ Mesh heightFieldMesh(const HeightField& field);
 // seed and water_level count.
 GeneratedMesh makeTerrain(const TerrainParams& params, const HeightField& field);
 
+// A ball of small see-through squares, turned at random, densest in its middle: a density volume as
+// a renderer of surfaces can draw it.
+struct MistParams {
+    uint64_t seed = 1;
+    double radius = 1.0;  // metres
+    int patches = 20000;  // 1..2000000, two triangles each
+    double patch = 0.05;  // metres, side of a square
+    double depth = 1.0;  // optical depth through the middle: exp(-depth) of the light comes through
+    Vec3 color = Vec3(0.8f);
+};
+GeneratedMesh makeMist(const MistParams& params);
+
 // A simple body for test scenes: "sphere" (diameter 1), "box" (side 1), "plane" (side 1, facing
-// +y), "torus", all centred on the origin, tessellated into about `triangles` triangles.
-GeneratedMesh makePrimitive(const std::string& kind, int triangles, const Vec3& color);
+// +y), "torus", all centred on the origin, tessellated into about `triangles` triangles. Seen from
+// both sides where alpha is below 1.
+GeneratedMesh makePrimitive(const std::string& kind, int triangles, const Vec3& color,
+                            float alpha = 1.0f);
 
 }  // namespace stipple

@@ -88,7 +88,8 @@ void appendTorus(Mesh& mesh, int triangles) {
 
 }  // namespace
 
-GeneratedMesh makePrimitive(const std::string& kind, int triangles, const Vec3& color) {
+GeneratedMesh makePrimitive(const std::string& kind, int triangles, const Vec3& color,
+                            float alpha) {
     if (triangles < 1 || triangles > 50000000) {
         throw Error(ErrorCode::kInvalidArgument, "",
                     "a primitive's triangles must be in 1..50000000");
@@ -119,6 +120,11 @@ GeneratedMesh makePrimitive(const std::string& kind, int triangles, const Vec3& 
     Material material;
     material.name = kind;
     material.base_color = color;
+    if (alpha < 1.0f) {
+        material.alpha = alpha;
+        material.alpha_mode = AlphaMode::kBlend;
+        material.double_sided = true;
+    }
     result.materials.push_back(material);
     return result;
 }

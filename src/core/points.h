@@ -75,6 +75,11 @@ inline constexpr uint8_t kNoPatch = 0;
 inline constexpr float kSurfaceWidth = 8.0f;
 inline constexpr uint8_t kSurfaceCode = patchWidthCode(kSurfaceWidth, kFirstSubpixelExponent);
 
+// Of points that are kept, see PointBlock::keep.
+inline constexpr uint8_t kBlended = 2;
+// Blended surfaces are as good as opaque where alpha is at least this, and drawn so.
+inline constexpr float kOpaqueAlpha = 254.5f / 255.0f;
+
 // Up to 64 points in camera space, structure of arrays.
 struct PointBlock {
     int count = 0;
@@ -82,10 +87,13 @@ struct PointBlock {
     alignas(64) float y[kBlockPoints + kBlockPadding];
     alignas(64) float z[kBlockPoints + kBlockPadding];
     alignas(64) uint32_t number[kBlockPoints + kBlockPadding];  // names the point within its tile
-    alignas(64) uint8_t keep[kBlockPoints + kBlockPadding];     // 1: kept by thinning, 0: not there
-    alignas(64) uint8_t width[kBlockPoints + kBlockPadding];    // patchWidthCode(), in subpixels
-    // Only for sinks that want surfels: geometric normal (unit, camera space, either side) and the
-    // area that a kept point stands for, m^2. Not filled where the width is kNoPatch.
+    // 1: kept by thinning, 0: not there. For sinks that want layers kBlended: kept, on a blended
+    // surface, with an alpha of its own.
+    alignas(64) uint8_t keep[kBlockPoints + kBlockPadding];
+    alignas(64) uint8_t width[kBlockPoints + kBlockPadding];  // patchWidthCode(), in subpixels
+    // Only for sinks that want surfels, and for blended points: geometric normal (unit, camera
+    // space, either side) and the area that a kept point stands for, m^2. Not filled where the
+    // width is kNoPatch, but for blended points.
     alignas(64) float normal_x[kBlockPoints + kBlockPadding];
     alignas(64) float normal_y[kBlockPoints + kBlockPadding];
     alignas(64) float normal_z[kBlockPoints + kBlockPadding];
@@ -93,7 +101,8 @@ struct PointBlock {
     bool is_prebuilt = false;  // areas are those of discs that close the surface, however dense
 };
 
-// Says whether a triangle of a block has surface at a subpixel (alpha masks).
+// Says whether a triangle of a block has surface at a subpixel (alpha masks). For sinks that want
+// layers blended triangles have none but where they are opaque.
 class MaskTest {
 public:
     virtual ~MaskTest() = default;
@@ -106,8 +115,9 @@ public:
 struct TriangleBlock {
     int count = 0;
     uint32_t first_number = 0;
-    const MaskTest* mask = nullptr;        // nullptr: all surface
-    bool is_wide = false;                  // on a patch at least kSurfaceWidth wide
+    const MaskTest* mask = nullptr;  // nullptr: all surface
+    uint64_t blended = 0;            // for sinks that want layers: bit i, triangle i is blended
+    bool is_wide = false;            // on a patch at least kSurfaceWidth wide
     alignas(64) float x[3][kBlockPoints];  // of the three vertices
     alignas(64) float y[3][kBlockPoints];
     alignas(64) float z[3][kBlockPoints];
@@ -129,6 +139,8 @@ public:
     virtual const SubpixelRect& region() const = 0;  // subpixels the sink wants, tile and halo
     // True if blocks must have normals and areas.
     virtual bool wantsSurfels() const { return false; }
+    // True if blended surfaces come in all their layers; may be so only where drawsLayers().
+    virtual bool wantsLayers() const { return false; }
 };
 
 // Emits a source's batches for one tile; used by one thread. Numbers stay valid until forget().

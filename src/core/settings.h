@@ -13,7 +13,7 @@
 namespace stipple {
 
 enum class Method { kPoints, kZBuffer, kRaycast };
-enum class Reconstruct { kPerPixel, kSplat, kGaussian, kPullPush, kEwa };
+enum class Reconstruct { kPerPixel, kSplat, kGaussian, kPullPush, kEwa, kBins };
 enum class PullPushCoverage { kBilinear, kSquares };
 enum class Sampler { kStratified, kRandom };
 enum class Tone { kNone, kFilmic, kAces, kAgx };
@@ -53,6 +53,13 @@ struct RenderSettings {
     bool culling = true;         // skip batches behind what a tile has already drawn
     bool fill = true;            // per-pixel: occlusion removal and filling
 };
+
+// Whether blended surfaces are drawn in all their layers, each point with its alpha, for a
+// reconstruction that puts the layers together; else a share alpha of their points is drawn, and
+// those hide what lies behind.
+inline bool drawsLayers(const RenderSettings& settings) {
+    return settings.method == Method::kPoints && settings.reconstruct == Reconstruct::kBins;
+}
 
 // One setting as command line, JSON and help see it.
 struct SettingInfo {

@@ -25,6 +25,7 @@ struct SurfaceSample {
         Vec3(0, 1, 0);      // unit, shading normal, on the side the asset's author gave it
     Vec3 albedo = Vec3(0);  // linear base colour: material x texture x vertex colour
     SurfaceFinish finish;
+    float alpha = 1.0f;             // of blended surfaces that are drawn in layers
     float patch_width = kInfinity;  // of the connected patch (a leaf, a terrain), metres
     uint32_t material = 0;          // index into Scene::materials
     uint32_t object = 0;            // hash of the instance path, 0 where there is nothing

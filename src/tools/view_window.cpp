@@ -386,9 +386,9 @@ private:
             ImGui::EndCombo();
         }
         static constexpr const char* kReconstructions[] = {"per-pixel", "splat", "gaussian",
-                                                           "pull-push", "ewa"};
+                                                           "pull-push", "ewa",   "bins"};
         int reconstruct = int(settings_.reconstruct);
-        if (ImGui::Combo("reconstruction", &reconstruct, kReconstructions, 5)) {
+        if (ImGui::Combo("reconstruction", &reconstruct, kReconstructions, 6)) {
             settings_.reconstruct = Reconstruct(reconstruct);
             has_changed_ = true;
         }

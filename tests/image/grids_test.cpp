@@ -175,7 +175,7 @@ TEST_P(GridCoverage, isOneWithinAndTheFractionOnEdges) {
 std::vector<Case> coverageCases() {
     std::vector<Case> cases;
     for (const Reconstruct r :
-         {Reconstruct::kPerPixel, Reconstruct::kGaussian, Reconstruct::kEwa}) {
+         {Reconstruct::kPerPixel, Reconstruct::kGaussian, Reconstruct::kEwa, Reconstruct::kBins}) {
         for (const double slope : {0.0, 40.0, 60.0, 80.0}) {
             for (const double cells : {0.25, 1.0, 4.0, 16.0})
                 cases.push_back({r, cells, slope, false});
@@ -344,7 +344,7 @@ TEST(Grids, nestedInstancesWithShadowsAreWhatRaysSee) {
     ThreadPool pool(2);
     for (const Reconstruct reconstruct :
          {Reconstruct::kPerPixel, Reconstruct::kSplat, Reconstruct::kGaussian,
-          Reconstruct::kPullPush, Reconstruct::kEwa}) {
+          Reconstruct::kPullPush, Reconstruct::kEwa, Reconstruct::kBins}) {
         r.settings.reconstruct = reconstruct;
         const CompareResult result = compareImages(render(scene, r), rays, pool);
         EXPECT_GE(result.psnr, 26.0) << settingValue(r.settings, "reconstruct");
@@ -353,6 +353,25 @@ TEST(Grids, nestedInstancesWithShadowsAreWhatRaysSee) {
         EXPECT_LE(result.holes->fraction, reconstruct == Reconstruct::kPerPixel ? 1e-3 : 0.0)
             << settingValue(r.settings, "reconstruct");
     }
+}
+
+TEST(Grids, whatIsSeenThroughThemInBinsIsWhatRaysSee) {
+    UvGridParams ball, sheet;
+    ball.shape = shapeOf("sphere");
+    ball.displacements.push_back(ripples(0.05, 10, 5));
+    sheet.shape.size = DVec2(50.0);
+    sheet.displacements.push_back(ripples(4.0, 3, 3, 32));
+    Scene scene;
+    const uint32_t balls = addGrid(scene, ball, Vec3(0.9f, 0.5f, 0.1f));
+    scene.materials[0].alpha = 0.4f;
+    scene.materials[0].alpha_mode = AlphaMode::kBlend;
+    const uint32_t behind = addGrid(scene, sheet, Vec3(0.1f, 0.3f, 0.8f));
+    build(scene, {{balls, {DMat3(40.0), DVec3(-8.0, 4.0, 30.0)}},
+                  {balls, {DMat3(30.0), DVec3(10.0, -6.0, 60.0)}},
+                  {behind, {turned(0.7, 0.3), DVec3(0.0)}}});
+    const FrameRequest r = request(Reconstruct::kBins);
+    ThreadPool pool(2);
+    EXPECT_GE(compareImages(render(scene, r), castRays(scene, r), pool).psnr, 30.0);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace {
 
 constexpr Reconstruct kReconstructions[] = {Reconstruct::kPerPixel, Reconstruct::kSplat,
                                             Reconstruct::kGaussian, Reconstruct::kPullPush,
-                                            Reconstruct::kEwa};
+                                            Reconstruct::kEwa,      Reconstruct::kBins};
 
 uint32_t addMesh(Scene& scene, GeneratedMesh made) {
     for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(m + scene.materials.size());

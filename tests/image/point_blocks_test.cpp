@@ -109,8 +109,9 @@ TEST(PointBlocks, treesLookLikeRaysFromAnywhere) { expectLikeRays(tree(), 256, 2
 TEST(PointBlocks, noTearsWhenMagnifiedAndAtTheEdgesOfAWideView) {
     ThreadPool pool(2);
     const Pair pair = makePair(torus(), 64, pool);
-    for (const Reconstruct method : {Reconstruct::kPerPixel, Reconstruct::kGaussian,
-                                     Reconstruct::kPullPush, Reconstruct::kEwa}) {
+    for (const Reconstruct method :
+         {Reconstruct::kPerPixel, Reconstruct::kGaussian, Reconstruct::kPullPush, Reconstruct::kEwa,
+          Reconstruct::kBins}) {
         for (int d = 0; d < kMaskDirections; d += 31) {
             const Camera camera = cameraTo(pair.source, maskDirectionOf(d), 64, 256, 4.0);
             const Image rays = draw(pair.source, camera, 256, Method::kRaycast, 9, pool),

@@ -244,7 +244,8 @@ TEST(Shadows, everyReconstructionTakesThem) {
     const Image rays = render(scene, request(), Method::kRaycast, true);
     ThreadPool pool(2);
     for (const Reconstruct reconstruct :
-         {Reconstruct::kSplat, Reconstruct::kGaussian, Reconstruct::kPullPush, Reconstruct::kEwa}) {
+         {Reconstruct::kSplat, Reconstruct::kGaussian, Reconstruct::kPullPush, Reconstruct::kEwa,
+          Reconstruct::kBins}) {
         FrameRequest r = request();
         r.settings.reconstruct = reconstruct;
         EXPECT_GT(compareImages(render(scene, r, Method::kPoints, true), rays, pool).psnr, 28.0);

@@ -105,6 +105,10 @@ TEST(IoSceneGrids, picturesGiveColourAndAlpha) {
               (std::vector<uint8_t>{255, 0, 0, 0, 255, 0, 0, 0, 255, 0, 0, 255, 255, 0, 0, 255}));
     EXPECT_EQ(t.wrap_u, Wrap::kClamp);
     EXPECT_NEAR(at(loaded, 0.9f), 1.0f, 0.01f);
+    loaded = load(folder, {{"alpha", 0.25}});
+    EXPECT_EQ(loaded.scene.materials[0].alpha_mode, AlphaMode::kBlend);
+    EXPECT_TRUE(loaded.scene.materials[0].double_sided);
+    EXPECT_NEAR(at(loaded, 0.5f), 0.25f, 0.01f);
     // Around a body pictures close.
     loaded = load(folder, {{"surface", "sphere"}, {"texture", "red.png"}});
     EXPECT_EQ(loaded.scene.textures[0].wrap_u, Wrap::kRepeat);

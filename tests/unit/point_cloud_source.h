@@ -13,6 +13,7 @@ struct TestPoint {
     float area = 0.0f;   // m^2
     float width = 1e4f;  // of the patch, subpixels
     uint32_t material = 0;
+    float alpha = 1.0f;  // below 1: of a blended surface
 };
 
 class PointCloudSource : public PointSource {
@@ -36,7 +37,7 @@ private:
                     block.x[i] = p.position.x, block.y[i] = p.position.y;
                     block.z[i] = p.position.z;
                     block.number[i] = uint32_t(begin) + uint32_t(i);
-                    block.keep[i] = 1;
+                    block.keep[i] = p.alpha < 1.0f ? kBlended : 1;
                     block.width[i] = patchWidthCode(p.width, kFirstSubpixelExponent);
                     block.normal_x[i] = p.normal.x, block.normal_y[i] = p.normal.y;
                     block.normal_z[i] = p.normal.z;
@@ -49,6 +50,7 @@ private:
             sample.material = points_[number].material;
             sample.normal_world = points_[number].normal;
             sample.albedo = Vec3(0);
+            sample.alpha = points_[number].alpha;
             sample.finish = SurfaceFinish();
             sample.finish.emissive[int(sample.material)] = 1.0f;  // red, green or blue
             sample.object = 1;

@@ -10,7 +10,7 @@ namespace stipple {
 namespace {
 
 constexpr Reconstruct kAll[] = {Reconstruct::kPerPixel, Reconstruct::kSplat, Reconstruct::kGaussian,
-                                Reconstruct::kPullPush, Reconstruct::kEwa};
+                                Reconstruct::kPullPush, Reconstruct::kEwa,   Reconstruct::kBins};
 
 std::string nameOf(const TestFrame& frame) {
     return settingValue(frame.settings, "reconstruct") + " subpixels " +

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Panes of glass, a ball of mist and masked leaves against many rays that pass each layer by
+// chance.
+#include <gtest/gtest.h>
+#include <render/compare.h>
+#include <render/renderer.h>
+#include <scenegraph/procedural/generators.h>
+
+namespace stipple {
+namespace {
+
+uint32_t addMesh(Scene& scene, GeneratedMesh made) {
+    for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(m + scene.materials.size());
+    scene.materials.insert(scene.materials.end(), made.materials.begin(), made.materials.end());
+    scene.meshes.push_back(std::move(made.mesh));
+    return uint32_t(scene.meshes.size() - 1);
+}
+
+// Four panes behind each other, one of them in fine triangles, a glass ball, a tree and mist before
+// a floor and boxes.
+Scene glassScene() {
+    Scene scene;
+    scene.path = "test";
+    scene.lighting.suns.push_back({glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(2.0f)});
+    const Vec3 colors[] = {
+        {0.8f, 0.1f, 0.1f}, {0.7f, 0.6f, 0.1f}, {0.1f, 0.6f, 0.2f}, {0.1f, 0.2f, 0.8f}};
+    Group root;
+    root.name = "root";
+    root.instances = InstanceStore(DBox3{DVec3(-20), DVec3(20)});
+    const DMat3 upright(1, 0, 0, 0, 0, 1, 0, -1, 0);
+    for (int i = 0; i < 4; ++i) {
+        const uint32_t pane = addMesh(
+            scene, makePrimitive("plane", i == 2 ? 200000 : 2, colors[i], 0.3f + 0.1f * float(i)));
+        root.instances.add(
+            ChildRef::mesh(pane),
+            {upright * DMat3(2.4), DVec3(-2.0 + 0.7 * i, 1.4 + 0.2 * (i % 2), 2.0 - i)});
+    }
+    const uint32_t ball =
+        addMesh(scene, makePrimitive("sphere", 30000, Vec3(0.6f, 0.8f, 0.8f), 0.3f));
+    root.instances.add(ChildRef::mesh(ball), {DMat3(2.0), DVec3(2.6, 1.2, 1.0)});
+    MistParams mist;
+    mist.radius = 3.0;
+    mist.patches = 60000;
+    mist.patch = 0.05;
+    mist.depth = 1.0;
+    root.instances.add(ChildRef::mesh(addMesh(scene, makeMist(mist))),
+                       {DMat3(1.0), DVec3(1, 1.5, -5)});
+    TreeParams tree;
+    tree.triangles = 8000;
+    root.instances.add(ChildRef::mesh(addMesh(scene, makeTree(tree))),
+                       {DMat3(0.5), DVec3(-3, 0, -8)});
+    const uint32_t box = addMesh(scene, makePrimitive("box", 12, Vec3(0.8f)));
+    for (int i = 0; i < 6; ++i)
+        root.instances.add(ChildRef::mesh(box), {DMat3(0.6), DVec3(1.2 * i - 3.0, 0.6, -3.0)});
+    const uint32_t floor = addMesh(scene, makePrimitive("plane", 2, Vec3(0.4f, 0.4f, 0.35f)));
+    root.instances.add(ChildRef::mesh(floor), {DMat3(100.0), DVec3(0.0)});
+    scene.groups.push_back(std::move(root));
+    scene.root = 0;
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    return scene;
+}
+
+FrameRequest request(bool orthographic) {
+    FrameRequest r;
+    r.camera = lookAt(DVec3(0.3, 2.0, 9.0), DVec3(0.2, 1.4, 0.0));
+    r.camera.orthographic = orthographic;
+    r.camera.height = 6.0;
+    r.settings.width = 200;
+    r.settings.height = 150;
+    r.settings.reconstruct = Reconstruct::kBins;
+    return r;
+}
+
+Image render(const Scene& scene, const FrameRequest& r, int threads = 2) {
+    ThreadPool pool(threads);
+    return Renderer(scene, pool).render(r).image;
+}
+
+TEST(BinsImage, layersLookAsManyRaysSeeThem) {
+    const Scene scene = glassScene();
+    ThreadPool pool(2);
+    for (const bool orthographic : {false, true}) {
+        FrameRequest r = request(orthographic);
+        r.settings.method = Method::kRaycast;
+        r.settings.samples = 256;
+        const Image rays = render(scene, r);
+        r.settings.method = Method::kPoints;
+        r.settings.samples = RenderSettings().samples;
+        for (const double threshold : {RenderSettings().area_threshold, 1e6}) {
+            r.settings.area_threshold = threshold;  // the higher, the more are points
+            const CompareResult result = compareImages(render(scene, r), rays, pool);
+            EXPECT_GT(result.psnr, 30.0) << "orthographic " << orthographic << ", " << threshold;
+        }
+        // What hides behind one layer is lost by the others: the test would see it.
+        r.settings.area_threshold = RenderSettings().area_threshold;
+        r.settings.reconstruct = Reconstruct::kGaussian;
+        EXPECT_LT(compareImages(render(scene, r), rays, pool).psnr, 28.0);
+    }
+}
+
+TEST(BinsImage, sameBitsForAnyThreadsAndWithoutCulling) {
+    const Scene scene = glassScene();
+    FrameRequest r = request(false);
+    const Image one = render(scene, r, 1);
+    for (const int threads : {2, 7}) EXPECT_EQ(render(scene, r, threads).data, one.data);
+    r.settings.culling = false;
+    EXPECT_EQ(render(scene, r).data, one.data);
+}
+
+}  // namespace
+}  // namespace stipple
