@@ -237,6 +237,12 @@ GeneratedMesh heightMapTerrain(SceneReader& reader, const std::string& name, con
     return terrain;
 }
 
+// Grids are made one after the other, each by all threads.
+bool isGrid(const Json& asset) {
+    const auto it = asset.find("generate");
+    return it != asset.end() && *it == "grid";
+}
+
 ChildRef addGenerated(SceneReader& reader, const std::string& name, GeneratedMesh generated,
                       const JsonPath& path) {
     generated.mesh.name = oneLine(name);
@@ -263,7 +269,7 @@ void readAssets(SceneReader& reader, const Json& assets) {
     std::mutex mutex;
     reader.pool.forEach(jobs.size(), [&](size_t i, int) {
         Job& job = jobs[i];
-        if (!job.asset->contains("generate")) return;
+        if (!job.asset->contains("generate") || isGrid(*job.asset)) return;
         const JsonPath path = {"assets", job.name};
         try {
             reader.context.throwIfCancelled();
@@ -277,6 +283,11 @@ void readAssets(SceneReader& reader, const Json& assets) {
         if (job.error) std::rethrow_exception(job.error);
         const JsonPath path = {"assets", job.name};
         reader.context.throwIfCancelled();
+        if (isGrid(*job.asset)) {
+            reader.children[job.name] = withPlace(
+                reader, path, [&] { return readGrid(reader, job.name, *job.asset, path); });
+            continue;
+        }
         if (job.asset->contains("height_map")) {
             job.result = withPlace(
                 reader, path, [&] { return heightMapTerrain(reader, job.name, *job.asset, path); });

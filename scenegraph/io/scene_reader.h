@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of reading a scene file: assets (scene_assets.cpp), groups (scene_groups.cpp), lights
-// (scene_lights.cpp), the rest (scene_file.cpp). Internal.
+// The parts of reading a scene file: assets (scene_assets.cpp, scene_grids.cpp), groups
+// (scene_groups.cpp), lights (scene_lights.cpp), the rest (scene_file.cpp). Internal.
 #pragma once
 
 #include <core/parallel.h>
@@ -38,6 +38,10 @@ struct SceneReader {
 // Adds the assets' meshes, materials and textures, and their names. What is generated is so in
 // parallel.
 void readAssets(SceneReader& reader, const Json& assets);
+
+// The asset that is a grid (scene_grids.cpp).
+ChildRef readGrid(SceneReader& reader, const std::string& name, const Json& asset,
+                  const JsonPath& path);
 
 // Adds the instances of groups[index], whose name is in reader.children already. instances: the
 // group's explicit ones, which have been taken out of `group` and are not yet validated.

@@ -136,7 +136,7 @@ struct MistParams {
     double radius = 1.0;  // metres
     int patches = 20000;  // 1..2000000, two triangles each
     double patch = 0.05;  // metres, side of a square
-    double depth = 1.0;   // optical depth through the middle: exp(-depth) of the light comes through
+    double depth = 1.0;  // optical depth through the middle: exp(-depth) of the light comes through
     Vec3 color = Vec3(0.8f);
 };
 GeneratedMesh makeMist(const MistParams& params);

@@ -386,7 +386,7 @@ private:
             ImGui::EndCombo();
         }
         static constexpr const char* kReconstructions[] = {"per-pixel", "splat", "gaussian",
-                                                           "pull-push", "ewa", "bins"};
+                                                           "pull-push", "ewa",   "bins"};
         int reconstruct = int(settings_.reconstruct);
         if (ImGui::Combo("reconstruction", &reconstruct, kReconstructions, 6)) {
             settings_.reconstruct = Reconstruct(reconstruct);

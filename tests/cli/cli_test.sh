@@ -558,6 +558,72 @@ JSON
         fail "standard input"
 }
 
+# A grid whose table has a cliff, in a group that is shown twice.
+write_grid_scene() {
+    python3 - <<'PY' || fail "no table"
+import struct, zlib
+def chunk(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+open("cliff.png", "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 4, 1, 8, 0, 0, 0, 0))
+    + chunk(b"IDAT", zlib.compress(b"\0\0\0\xff\xff")) + chunk(b"IEND", b""))
+PY
+    cat >grid.scene.json <<JSON
+{
+  "version": 1,
+  "assets": { "cliff": { "generate": "grid", ${1:-\"surface\": \"plane\"}, "displacement": { "file": "cliff.png" } } },
+  "groups": {
+    "pair": { "instances": [ { "child": "cliff" }, { "child": "cliff", "translation": [1.2, 0, 0], "rotation": [0, 90, 0] } ] },
+    "all": { "instances": [ { "child": "pair" }, { "child": "pair", "translation": [0, 0, -1.5], "scale": [1, 2, 1] } ] }
+  },
+  "cameras": [ { "name": "front", "eye": [2, 2, 4], "target": [0.5, 0.3, 0] } ],
+  "lights": { "suns": [ { "direction": [-1, 1, 1], "irradiance": [2, 2, 2] } ] },
+  "root": "all"
+}
+JSON
+}
+
+case_grid() {
+    write_grid_scene '"refine": 0'
+    expect_ok render grid.scene.json -o a.png "${tiny[@]}" --shadows on
+    grep -q '^stipple: warning: grid.scene.json: /assets/cliff: the displaced surface pulls apart: at u 0' stderr.txt ||
+        fail "no warning"
+    write_grid_scene '"refine": 4'
+    cat >edits.jsonl <<JSON
+{"do": "move", "group": "pair", "index": 1, "translation": [1.5, 0.2, 0]}
+{"do": "insert", "child": "cliff", "translation": [0, 0, 1.5]}
+{"do": "render", "output": "a.png"}
+{"do": "save", "output": "saved.scene.json"}
+JSON
+    expect_ok edit grid.scene.json --script edits.jsonl "${tiny[@]}" --quiet
+    [[ ! -s stderr.txt ]] || fail "a warning where the grid is refined"
+    grep -q '"refine": 4' saved.scene.json || fail "the rule is gone"
+    expect_ok render saved.scene.json -o b.png "${tiny[@]}" --quiet
+    cmp -s a.png b.png || fail "the saved scene is another"
+    for method in zbuffer raycast; do
+        expect_ok render saved.scene.json -o c.png "${tiny[@]}" --method $method --quiet
+        run compare c.png b.png
+        expect_stdout 'PSNR'
+    done
+}
+
+case_grid_errors() {
+    write_grid_scene '"surface": "blob"'
+    expect_error 3 'grid.scene.json: /assets/cliff/surface: ' render grid.scene.json -o a.png
+    write_grid_scene '"surface": "sphere", "size": [1, 2]'
+    expect_error 3 'grid.scene.json: /assets/cliff/size: means nothing for a sphere' render grid.scene.json -o a.png
+    write_grid_scene '"resolution": 16384'
+    expect_error 3 'grid.scene.json: /assets/cliff: a grid of 16384 x 16384 cells' render grid.scene.json -o a.png
+    write_grid_scene '"texture": "none.png"'
+    expect_error 3 'grid.scene.json: /assets/cliff/texture: "none.png" cannot be opened' render grid.scene.json -o a.png
+    write_grid_scene
+    rm cliff.png
+    expect_error 3 'grid.scene.json: /assets/cliff/displacement/file: "cliff.png" cannot be opened' \
+        render grid.scene.json -o a.png
+    echo "no picture, but long enough" >cliff.png
+    expect_error 3 'grid.scene.json: /assets/cliff/displacement/file: not a PNG' render grid.scene.json -o a.png
+    expect_no_file 'a.png'
+}
+
 case_edit_errors() {
     write_edit_scene
     cat >edits.jsonl <<JSON

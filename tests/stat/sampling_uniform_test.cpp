@@ -7,21 +7,10 @@
 #include <sampling/random_sampler.h>
 #include <scenegraph/procedural/generators.h>
 
+#include "chi_square.h"
+
 namespace stipple {
 namespace {
-
-// Critical value of chi-square at 1 % (Wilson, Hilferty).
-double criticalValue(double degrees) {
-    const double z = 2.326, a = 2.0 / (9.0 * degrees);
-    return degrees * std::pow(1.0 - a + z * std::sqrt(a), 3.0);
-}
-
-double chiSquare(const std::vector<double>& counts, const std::vector<double>& expected) {
-    double sum = 0.0;
-    for (size_t i = 0; i < counts.size(); ++i)
-        sum += (counts[i] - expected[i]) * (counts[i] - expected[i]) / expected[i];
-    return sum;
-}
 
 // Takes all points of a frame and nothing else.
 class Collector : public PointSink {
