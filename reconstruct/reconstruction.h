@@ -4,6 +4,7 @@
 // and may ask to see them several times (passes).
 #pragma once
 
+#include <core/ambient_visibility.h>
 #include <core/light.h>
 #include <core/material.h>
 #include <core/points.h>
@@ -30,8 +31,9 @@ struct ReconstructionContext {
     RenderSettings settings;
     const std::vector<Material>* materials = nullptr;
     const Lighting* lighting = nullptr;
-    const RasterTarget* base = nullptr;             // rasterized triangles; nullptr: none
-    const SunVisibility* sun_visibility = nullptr;  // nullptr: nothing casts shadows
+    const RasterTarget* base = nullptr;                     // rasterized triangles; nullptr: none
+    const SunVisibility* sun_visibility = nullptr;          // nullptr: nothing casts shadows
+    const AmbientVisibility* ambient_visibility = nullptr;  // nullptr: all is open
     Picture* picture = nullptr;
 };
 

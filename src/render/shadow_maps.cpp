@@ -2,8 +2,6 @@
 #include <render/shadow_maps.h>
 
 #include <core/stopwatch.h>
-#include <reconstruct/depth_only.h>
-#include <render/tile_loop.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +10,6 @@ namespace stipple {
 
 namespace {
 
-// The first look has a subpixel for so many pixels along a side.
-constexpr int kLookPixels = 4;
 // What the first look has seen may reach this far beyond: texels.
 constexpr double kPageMargin = 8.0;
 // A level's pages lie within a rectangle of at most so many along a side; farther apart, they are
@@ -42,88 +38,25 @@ void sortUnique(std::vector<PageKey>& pages) {
     pages.erase(std::unique(pages.begin(), pages.end()), pages.end());
 }
 
-// What is visible at low resolution.
-struct Look {
-    View view;
-    std::vector<float> depth;  // a subpixel
-};
-
 class ShadowBuilder {
 public:
-    ShadowBuilder(const Scene& scene, const View& view, RandomizedSampler& sampler,
-                  const RasterizeLarge& rasterize, ThreadPool& pool, const FrameRequest& request)
-        : scene_(scene),
-          view_(view),
-          sampler_(sampler),
-          rasterize_(rasterize),
-          pool_(pool),
-          request_(request) {
+    ShadowBuilder(const Scene& scene, const View& view, const DepthDrawer& drawer)
+        : scene_(scene), view_(view), drawer_(drawer), settings_(drawer.request.settings) {
         const DBox3 bounds = sceneBounds(scene);
         bounds_min_ = bounds.min;
         bounds_max_ = bounds.max;
     }
 
-    std::unique_ptr<ShadowPages> build(FrameStats& stats) {
-        const Look look = lookAtScene();
+    std::unique_ptr<ShadowPages> build(const FirstLook& look, FrameStats& stats) {
         std::vector<SunShadow> suns;
         for (const Sun& sun : scene_.lighting.suns) suns.push_back(drawSun(sun, look));
         stats.shadow_points += drawn_.points_drawn;
-        return std::make_unique<ShadowPages>(view_, request_.settings.shadow_texel,
-                                             std::move(suns));
+        return std::make_unique<ShadowPages>(view_, settings_.shadow_texel, std::move(suns));
     }
 
 private:
-    // Draws depths of a view into tiles that are wanted (empty: all).
-    void drawDepths(const View& view, const RenderSettings& settings,
-                    const std::function<bool(const SubpixelRect&)>& is_wanted, bool rasterizes,
-                    const TakeDepths& take) {
-        const FramePlan& plan = sampler_.plan(view, settings, pool_, request_.cancel);
-        ReconstructionContext context;
-        context.view = view;
-        context.settings = settings;
-        if (rasterizes) context.base = rasterize_(view, plan);
-        const TriangleLookup nothing = [](uint32_t, float, float, SurfaceSample&) {};
-        TileJob job;
-        job.view = view;
-        job.tile_size = settings.tile_size;
-        job.makeReconstruction = [&] { return makeDepthOnly(context, take); };
-        job.is_wanted = is_wanted;
-        job.source = &sampler_;
-        job.batches = &plan.batches;
-        job.triangle_lookup = &nothing;
-        job.phase = "shadows";
-        runTiles(job, pool_, request_, drawn_);
-    }
-
-    Look lookAtScene() {
-        Look look;
-        look.view = view_;
-        look.view.subpixels = 1;
-        look.view.width = (view_.width + kLookPixels - 1) / kLookPixels;
-        look.view.height = (view_.height + kLookPixels - 1) / kLookPixels;
-        const double scale = 1.0 / (view_.subpixels * kLookPixels);
-        look.view.focal *= scale;
-        look.view.center_x *= scale;
-        look.view.center_y *= scale;
-        RenderSettings settings = request_.settings;
-        settings.subpixels = 1;
-        settings.samples = 1.0;
-        settings.tile_size = kPageTexels;
-        const int width = look.view.width;
-        look.depth.assign(size_t(width) * size_t(look.view.height), kInfinity);
-        const TakeDepths take = [&](const SubpixelRect& inner, const DepthTile& tile) {
-            for (int y = inner.y0; y < inner.y1; ++y) {
-                for (int x = inner.x0; x < inner.x1; ++x)
-                    look.depth[size_t(y) * size_t(width) + size_t(x)] =
-                        DepthTile::depthOf(tile.row(y)[x]);
-            }
-        };
-        drawDepths(look.view, settings, {}, true, take);
-        return look;
-    }
-
     // Pages that hold what the look has seen, at the size of a pixel there, and spare ones.
-    std::vector<PageKey> neededPages(const DMat3& sun_from_world, const Look& look,
+    std::vector<PageKey> neededPages(const DMat3& sun_from_world, const FirstLook& look,
                                      const ShadowPages& sizes) const {
         const float haze = scene_.lighting.sky.haze_distance;
         const float farthest = haze > 0.0f ? -haze * std::log(kHazeLeft) : kInfinity;
@@ -161,12 +94,12 @@ private:
         }
     }
 
-    SunShadow drawSun(const Sun& sun, const Look& look) {
+    SunShadow drawSun(const Sun& sun, const FirstLook& look) {
         SunShadow shadow;
         const DMat3 world_from_sun =
             lookAt(DVec3(0.0), -DVec3(sun.direction_to_light)).world_from_camera;
         shadow.sun_from_world = glm::transpose(world_from_sun);
-        const ShadowPages sizes(view_, request_.settings.shadow_texel, {});
+        const ShadowPages sizes(view_, settings_.shadow_texel, {});
         std::vector<PageKey> pages = neededPages(shadow.sun_from_world, look, sizes);
         if (pages.empty()) return shadow;
         shadow.first_exponent = pages.front().exponent;
@@ -221,7 +154,7 @@ private:
         view.focal = 1.0 / double(level.texel);
         view.near_z = 0.5f;
         view.far_z = float(z_max - z_min + 2.0);
-        RenderSettings settings = request_.settings;
+        RenderSettings settings = settings_;
         settings.subpixels = 1;
         settings.samples = 1.0;
         settings.tile_size = kPageTexels;
@@ -239,9 +172,9 @@ private:
                     *out++ = DepthTile::depthOf(tile.row(y)[x]);
             }
         };
-        drawDepths(
+        drawer_.draw(
             view, settings, [&](const SubpixelRect& inner) { return slotOf(inner) >= 0; }, false,
-            take);
+            take, drawn_);
         return true;
     }
 
@@ -269,10 +202,8 @@ private:
 
     const Scene& scene_;
     const View& view_;
-    RandomizedSampler& sampler_;
-    const RasterizeLarge& rasterize_;
-    ThreadPool& pool_;
-    const FrameRequest& request_;
+    const DepthDrawer& drawer_;
+    const RenderSettings& settings_;
     DVec3 bounds_min_, bounds_max_;
     FrameStats drawn_;
 };
@@ -280,12 +211,10 @@ private:
 }  // namespace
 
 std::unique_ptr<ShadowPages> makeShadowMaps(const Scene& scene, const View& view,
-                                            RandomizedSampler& sampler,
-                                            const RasterizeLarge& rasterize, ThreadPool& pool,
-                                            const FrameRequest& request, FrameStats& stats) {
+                                            const FirstLook& look, const DepthDrawer& drawer,
+                                            FrameStats& stats) {
     const Stopwatch watch;
-    std::unique_ptr<ShadowPages> maps =
-        ShadowBuilder(scene, view, sampler, rasterize, pool, request).build(stats);
+    std::unique_ptr<ShadowPages> maps = ShadowBuilder(scene, view, drawer).build(look, stats);
     stats.shadow_bytes = maps->bytes();
     stats.phases.emplace_back("shadows", watch.seconds());
     return maps;
