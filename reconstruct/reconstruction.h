@@ -6,11 +6,11 @@
 
 #include <core/ambient_visibility.h>
 #include <core/light.h>
+#include <core/light_visibility.h>
 #include <core/material.h>
 #include <core/points.h>
 #include <core/raster_job.h>
 #include <core/settings.h>
-#include <core/sun_visibility.h>
 #include <reconstruct/picture.h>
 
 #include <memory>
@@ -32,7 +32,7 @@ struct ReconstructionContext {
     const std::vector<Material>* materials = nullptr;
     const Lighting* lighting = nullptr;
     const RasterTarget* base = nullptr;                     // rasterized triangles; nullptr: none
-    const SunVisibility* sun_visibility = nullptr;          // nullptr: nothing casts shadows
+    const LightVisibility* light_visibility = nullptr;      // nullptr: nothing casts shadows
     const AmbientVisibility* ambient_visibility = nullptr;  // nullptr: all is open
     Picture* picture = nullptr;
 };

@@ -140,7 +140,7 @@ Vec3 skyRadiance(const Sky& sky, const Vec3& direction) {
 }
 
 Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
-           const View& view, const SunVisibility* suns, const AmbientVisibility* ambient) {
+           const View& view, const LightVisibility* lights, const AmbientVisibility* ambient) {
     if (material.unlit) return sample.albedo;
     const Vec3 to_eye_camera =
         view.orthographic ? Vec3(0.0f, 0.0f, -1.0f) : -sample.position_camera;
@@ -189,16 +189,20 @@ Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting
     for (size_t i = 0; i < lighting.suns.size(); ++i) {
         const Sun& sun = lighting.suns[i];
         if (through == Vec3(0.0f) && glm::dot(n, sun.direction_to_light) <= 0.0f) continue;
-        const float visible = suns ? suns->of(i, sample) : 1.0f;
+        const float visible = lights ? lights->ofSun(i, sample) : 1.0f;
         if (visible > 0.0f) addLight(sun.direction_to_light, sun.irradiance * visible);
     }
     if (!lighting.points.empty()) {
         const Vec3 from_eye = Mat3(glm::transpose(view.camera_from_world)) * sample.position_camera;
-        for (const PointLight& light : lighting.points) {
+        for (size_t i = 0; i < lighting.points.size(); ++i) {
+            const PointLight& light = lighting.points[i];
             // Relative to the eye, so that floats do far from the origin too.
             const Vec3 to_light = Vec3(light.position - view.eye_world) - from_eye;
             const Vec3 irradiance = incidentLight(light, to_light);
-            if (irradiance != Vec3(0.0f)) addLight(glm::normalize(to_light), irradiance);
+            if (irradiance == Vec3(0.0f)) continue;
+            if (through == Vec3(0.0f) && glm::dot(n, to_light) <= 0.0f) continue;
+            const float visible = lights ? lights->ofLamp(i, sample) : 1.0f;
+            if (visible > 0.0f) addLight(glm::normalize(to_light), irradiance * visible);
         }
     }
     if (lighting.sky.haze_distance > 0.0f) {

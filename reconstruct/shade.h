@@ -8,17 +8,17 @@
 #include <core/ambient_visibility.h>
 #include <core/camera.h>
 #include <core/light.h>
+#include <core/light_visibility.h>
 #include <core/material.h>
-#include <core/sun_visibility.h>
 #include <core/surface.h>
 
 namespace stipple {
 
 // Radiance towards the eye, linear. The sample's normal is turned towards the viewer for
-// double-sided materials. suns: null: nothing casts shadows. ambient: darkens what comes from sky
+// double-sided materials. lights: null: nothing casts shadows. ambient: darkens what comes from sky
 // or environment; null: nothing does.
 Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
-           const View& view, const SunVisibility* suns = nullptr,
+           const View& view, const LightVisibility* lights = nullptr,
            const AmbientVisibility* ambient = nullptr);
 
 // The two parts of a surface's BRDF, without translucency: what a light's irradiance on a surface

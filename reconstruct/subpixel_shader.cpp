@@ -7,7 +7,7 @@ namespace stipple {
 
 Vec3 SubpixelShader::shadeSample(const SurfaceSample& sample) const {
     return shade(sample, (*context_.materials)[sample.material], *context_.lighting, context_.view,
-                 context_.sun_visibility, context_.ambient_visibility);
+                 context_.light_visibility, context_.ambient_visibility);
 }
 
 void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y) {

@@ -118,7 +118,7 @@ std::vector<Entry> makeEntries() {
                             "how points become a picture"),
         number("splat_size", &S::splat_size, 0.1, 64.0, "pixels",
                "side of a splat, or of the box that has a gaussian's variance"),
-        onOff("shadows", &S::shadows, "shadows of the suns"),
+        onOff("shadows", &S::shadows, "shadows of suns, point and spot lights"),
         onOff("ao", &S::ao, "ambient occlusion: what is near darkens the light of the sky"),
         number("exposure", &S::exposure, -32.0, 32.0, "stops",
                "brightness, beside the scene file's exposure"),

@@ -27,45 +27,67 @@ struct RayBatch {
 // How far off a surface secondary rays begin: what floats lose at that distance from the eye.
 float offsetFrom(const Vec3& p) { return 1e-5f * std::max(glm::length(p), 0.01f); }
 
-// Shadows by their definition: a ray from every hit to every sun.
-class ShadowRays : public SunVisibility {
+// Shadows by their definition: a ray from every hit to every light that may reach it.
+class ShadowRays : public LightVisibility {
 public:
-    ShadowRays(const RayCaster& caster, const std::vector<Sun>& suns)
-        : caster_(caster), suns_(suns) {}
+    ShadowRays(const RayCaster& caster, const Lighting& lighting, const DVec3& eye_world)
+        : caster_(caster),
+          lighting_(lighting),
+          eye_world_(eye_world),
+          n_lights_(lighting.suns.size() + lighting.points.size()) {}
 
     // For the hits of `rays`.
     void cast(const std::vector<Ray>& rays, const std::vector<RayHit>& hits) {
-        is_hidden_.resize(suns_.size() * rays.size());
-        for (size_t s = 0; s < suns_.size(); ++s) {
-            to_sun_.clear();
+        is_hidden_.assign(n_lights_ * rays.size(), 0);
+        for (size_t light = 0; light < n_lights_; ++light) {
+            to_light_.clear();
             ray_of_.clear();
             for (size_t r = 0; r < rays.size(); ++r) {
-                if (!(hits[r].t < kInfinity)) continue;
-                to_sun_.push_back(rayToSun(rays[r], hits[r], suns_[s].direction_to_light));
-                ray_of_.push_back(r);
+                if (hits[r].t < kInfinity && addRay(rays[r], hits[r], light)) ray_of_.push_back(r);
             }
-            hit_.resize(to_sun_.size());
-            caster_.occluded(to_sun_.data(), to_sun_.size(), hit_.data());
+            hit_.resize(to_light_.size());
+            caster_.occluded(to_light_.data(), to_light_.size(), hit_.data());
             for (size_t i = 0; i < ray_of_.size(); ++i)
-                is_hidden_[ray_of_[i] * suns_.size() + s] = hit_[i];
+                is_hidden_[ray_of_[i] * n_lights_ + light] = hit_[i];
         }
     }
     void select(size_t ray) { ray_ = ray; }
-    float of(size_t sun, const SurfaceSample&) const override {
-        return is_hidden_[ray_ * suns_.size() + sun] ? 0.0f : 1.0f;
+    float ofSun(size_t sun, const SurfaceSample&) const override { return visible(sun); }
+    float ofLamp(size_t lamp, const SurfaceSample&) const override {
+        return visible(lighting_.suns.size() + lamp);
     }
 
 private:
-    static Ray rayToSun(const Ray& ray, const RayHit& hit, const Vec3& to_sun) {
+    float visible(size_t light) const { return is_hidden_[ray_ * n_lights_ + light] ? 0.0f : 1.0f; }
+
+    // False if a lamp does not shine there, or is there.
+    bool addRay(const Ray& ray, const RayHit& hit, size_t light) {
         const Vec3 p = ray.origin + ray.direction * hit.t;
         const float offset = offsetFrom(p);
-        const float side = glm::dot(hit.normal_world, to_sun) < 0.0f ? -1.0f : 1.0f;
-        return {p + hit.normal_world * (side * offset), 2.0f * offset, to_sun, kInfinity};
+        Vec3 direction;
+        float end = kInfinity;
+        if (light < lighting_.suns.size()) {
+            direction = lighting_.suns[light].direction_to_light;
+        } else {
+            const PointLight& lamp = lighting_.points[light - lighting_.suns.size()];
+            const Vec3 to_lamp = Vec3(lamp.position - eye_world_) - p;
+            if (incidentLight(lamp, to_lamp) == Vec3(0.0f)) return false;
+            const float distance = glm::length(to_lamp);
+            direction = to_lamp / distance;
+            end = distance - kLampClearance;
+            if (end <= 2.0f * offset) return false;
+        }
+        const float side = glm::dot(hit.normal_world, direction) < 0.0f ? -1.0f : 1.0f;
+        to_light_.push_back(
+            {p + hit.normal_world * (side * offset), 2.0f * offset, direction, end});
+        return true;
     }
 
     const RayCaster& caster_;
-    const std::vector<Sun>& suns_;
-    std::vector<Ray> to_sun_;
+    const Lighting& lighting_;
+    DVec3 eye_world_;
+    size_t n_lights_;
+    std::vector<Ray> to_light_;
     std::vector<size_t> ray_of_;
     std::vector<uint8_t> hit_, is_hidden_;
     size_t ray_ = 0;
@@ -189,7 +211,7 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
         std::vector<PixelSums> sums(kTilePixels * kTilePixels);
         RayBatch batch;
         std::array<uint64_t, kLargestBlock * kLargestBlock> pixel_keys;
-        ShadowRays shadows(caster, lighting.suns);
+        ShadowRays shadows(caster, lighting, view.eye_world);
         AmbientRays ambient(caster, request.settings);
         for (int by = y0; by < y1; by += side) {
             for (int bx = x0; bx < x1; bx += side) {

@@ -28,7 +28,7 @@ std::vector<RasterMesh> rasterMeshes(const Scene& scene) {
 constexpr int kShadowLookPixels = 4, kOcclusionLookPixels = 1;
 
 struct Visibility {
-    std::unique_ptr<SunVisibility> suns;         // null: nothing casts shadows
+    std::unique_ptr<LightVisibility> lights;     // null: nothing casts shadows
     std::unique_ptr<AmbientVisibility> ambient;  // null: all is open
 };
 
@@ -60,7 +60,8 @@ struct Renderer::Impl {
     // sampler has one at a time.
     Visibility makeVisibility(const FrameRequest& request, const View& view, FrameStats& stats) {
         Visibility visibility;
-        const bool has_shadows = request.settings.shadows && !scene.lighting.suns.empty();
+        const bool has_shadows = request.settings.shadows &&
+                                 (!scene.lighting.suns.empty() || !scene.lighting.points.empty());
         if (!has_shadows && !request.settings.ao) return visibility;
         const RasterizeLarge rasterize = [&](const View& v, const FramePlan& plan) {
             return rasterizePlan(v, plan);
@@ -72,7 +73,7 @@ struct Renderer::Impl {
         if (has_shadows) {
             drawer.phase = "shadows";
             if (request.progress) request.progress("shadows", 0.0);
-            visibility.suns = makeShadowMaps(scene, view, look, drawer, stats);
+            visibility.lights = makeShadowMaps(scene, view, look, drawer, stats);
         }
         if (request.settings.ao) {
             visibility.ambient = std::make_unique<ScreenOcclusion>(view, std::move(look),
@@ -91,7 +92,7 @@ struct Renderer::Impl {
         context.settings = request.settings;
         context.materials = &scene.materials;
         context.lighting = &scene.lighting;
-        context.sun_visibility = visibility.suns.get();
+        context.light_visibility = visibility.lights.get();
         context.ambient_visibility = visibility.ambient.get();
         context.picture = &picture;
         const Stopwatch raster_watch;

@@ -32,9 +32,14 @@ struct TestScene {
     Scene scene;
     Group root;
 
-    explicit TestScene(const Vec3& to_sun) {
-        scene.path = "test";
+    explicit TestScene(const Vec3& to_sun) : TestScene() {
         scene.lighting.suns.push_back({glm::normalize(to_sun), Vec3(3.0f)});
+    }
+    explicit TestScene(const PointLight& lamp) : TestScene() {
+        scene.lighting.points.push_back(lamp);
+    }
+    TestScene() {
+        scene.path = "test";
         root.instances = InstanceStore(DBox3{DVec3(-500), DVec3(500)});
         add(makePrimitive("plane", 2, Vec3(0.5f)), placed(DVec3(0.0), DVec3(400.0)));
     }
@@ -78,14 +83,9 @@ bool isEven(const Image& image, int x, int y, int radius, float tolerance) {
     return high - low <= tolerance * high;
 }
 
-class ShadowOfBox : public testing::TestWithParam<float> {};
-
 // An edge farther off than 1.5 pixels would show in a pixel whose neighbours, two pixels around,
 // are all lit or all in the shade; so would light under the box, or false shadow on the plane.
-TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
-    TestScene t(Vec3(-1.0f, GetParam(), 0.3f));
-    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), DVec3(3.0), 0.5));
-    const Scene& scene = t.build();
+void expectShadowsOfRays(const Scene& scene, int least_lit, int least_shaded) {
     const Image rays = render(scene, request(), Method::kRaycast, true);
     const Image open = render(scene, request(), Method::kRaycast, false);
     for (const Method method : {Method::kPoints, Method::kZBuffer}) {
@@ -99,13 +99,53 @@ TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
                 wrong += std::abs(maps.pixel(x, y)[1] - expected) > 0.03f * expected;
             }
         }
-        EXPECT_GT(lit, 20000);
-        EXPECT_GT(shaded, 400);
+        EXPECT_GT(lit, least_lit);
+        EXPECT_GT(shaded, least_shaded);
         EXPECT_EQ(wrong, 0);
+        ThreadPool pool(2);
+        EXPECT_GT(compareImages(maps, rays, pool).psnr, 28.0);
     }
 }
 
+class ShadowOfBox : public testing::TestWithParam<float> {};
+
+TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
+    TestScene t(Vec3(-1.0f, GetParam(), 0.3f));
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), DVec3(3.0), 0.5));
+    expectShadowsOfRays(t.build(), 20000, 400);
+}
+
 INSTANTIATE_TEST_SUITE_P(heights, ShadowOfBox, testing::Values(2.0f, 0.7f, 0.25f));
+
+PointLight spotAt(const DVec3& place, const DVec3& target) {
+    PointLight lamp;
+    lamp.position = place;
+    lamp.intensity = Vec3(120.0f);
+    lamp.is_spot = true;
+    lamp.axis = glm::normalize(Vec3(target - place));
+    lamp.inner_cone = 0.5f;
+    return lamp;
+}
+
+PointLight lampAt(const DVec3& place) {
+    PointLight lamp;
+    lamp.position = place;
+    lamp.intensity = Vec3(60.0f);
+    return lamp;
+}
+
+class ShadowOfLamp : public testing::TestWithParam<PointLight> {};
+
+// The plane begins behind the lamp where it shines aside.
+TEST_P(ShadowOfLamp, liesWhereRaysHaveIt) {
+    TestScene t(GetParam());
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 0.75, 0), DVec3(1.5), 0.5));
+    expectShadowsOfRays(t.build(), 10000, 400);
+}
+
+INSTANTIATE_TEST_SUITE_P(lamps, ShadowOfLamp,
+                         testing::Values(spotAt(DVec3(-4, 4, 1), DVec3(0, 0.5, 0)),
+                                         lampAt(DVec3(-3, 4, 1)), lampAt(DVec3(-2.2, 1.2, 0.9))));
 
 // A ball's lit side has no shadow of its own, and its far side no light, but for the pixels where
 // the light grazes it.
@@ -200,8 +240,36 @@ TEST(Shadows, treesAreAsBrightAsByRays) {
     EXPECT_GT(without.mean, 0.05);  // there is something to see
 }
 
+// One shines from within the trees to all sides, one from above.
+Scene woodByNight() {
+    Scene scene = wood(true);
+    scene.lighting.suns.clear();
+    scene.lighting.sky.zenith = scene.lighting.sky.horizon = Vec3(0.02f);
+    PointLight within = lampAt(DVec3(-36.0, 5.0, 4.0)),
+               above = spotAt(DVec3(60, 50, 20), DVec3(30, 0, -20));
+    within.intensity = Vec3(1500.0f);
+    above.intensity = Vec3(20000.0f);
+    scene.lighting.points = {within, above};
+    return scene;
+}
+
+TEST(Shadows, treesUnderLampsAreAsBrightAsByRays) {
+    const Scene scene = woodByNight();
+    const Image rays = render(scene, woodRequest(), Method::kRaycast, true);
+    const Image maps = render(scene, woodRequest(), Method::kPoints, true);
+    ThreadPool pool(2);
+    const TileMeans means = tileMeans(maps, rays);
+    EXPECT_NEAR(means.mean, 0.0, 0.02);
+    EXPECT_LT(means.rms, 0.05);
+    EXPECT_GT(compareImages(maps, rays, pool).psnr, 28.0);
+    const TileMeans without =
+        tileMeans(render(scene, woodRequest(), Method::kRaycast, false), rays);
+    EXPECT_GT(without.mean, 0.05);
+}
+
 TEST(Shadows, sameBitsForAnyNumberOfThreads) {
-    const Scene scene = wood(true);
+    Scene scene = wood(true);
+    scene.lighting.points = woodByNight().lighting.points;
     for (const Method method : {Method::kPoints, Method::kRaycast}) {
         const Image one = render(scene, woodRequest(), method, true, 1);
         EXPECT_EQ(one.data, render(scene, woodRequest(), method, true, 3).data);
