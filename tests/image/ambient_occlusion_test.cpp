@@ -3,47 +3,17 @@
 // plane, crowns as bright as by rays; the same bits for any number of threads.
 #include <gtest/gtest.h>
 #include <render/compare.h>
-#include <render/renderer.h>
-#include <scenegraph/procedural/generators.h>
+#include <tests/image/test_scene.h>
 
 namespace stipple {
 namespace {
 
 constexpr int kWidth = 320, kHeight = 200;
 
-uint32_t addMesh(Scene& scene, GeneratedMesh made) {
-    for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(m + scene.materials.size());
-    scene.materials.insert(scene.materials.end(), made.materials.begin(), made.materials.end());
-    scene.meshes.push_back(std::move(made.mesh));
-    return uint32_t(scene.meshes.size() - 1);
-}
-
-Affine placed(const DVec3& at, double size) {
-    Affine a;
-    a.linear = DMat3(size);
-    a.translation = at;
-    return a;
-}
-
 // A plane of so many triangles, and what stands on it, under the sky alone.
-struct TestScene {
-    Scene scene;
-    Group root;
-
-    explicit TestScene(int plane_triangles = 2) {
-        scene.path = "test";
-        root.instances = InstanceStore(DBox3{DVec3(-500), DVec3(500)});
-        add(makePrimitive("plane", plane_triangles, Vec3(0.5f)), placed(DVec3(0.0), 100.0));
-    }
-    void add(GeneratedMesh mesh, const Affine& at) {
-        root.instances.add(ChildRef::mesh(addMesh(scene, std::move(mesh))), at);
-    }
-    Scene& build() {
-        scene.root = uint32_t(scene.groups.size());
-        scene.groups.push_back(root);
-        ThreadPool pool(2);
-        buildScene(scene, pool);
-        return scene;
+struct OcclusionScene : TestScene {
+    explicit OcclusionScene(int plane_triangles = 2) {
+        add(makePrimitive("plane", plane_triangles, Vec3(0.5f)), placed(DVec3(0.0), DVec3(100.0)));
     }
 };
 
@@ -80,8 +50,8 @@ double leftAt(const Image& ao, const Image& open, const FrameRequest& r, const D
 }
 
 TEST(AmbientOcclusion, darkensWhereABoxMeetsAPlane) {
-    TestScene t;
-    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), 3.0));
+    OcclusionScene t;
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), DVec3(3.0)));
     const Scene& scene = t.build();
     const FrameRequest r = request(DVec3(3, 4, 9), DVec3(0, 0.6, 0));
     const Image open = render(scene, r, Method::kRaycast, false);
@@ -104,7 +74,7 @@ TEST(AmbientOcclusion, darkensWhereABoxMeetsAPlane) {
 // Seen from above and grazing, as two large triangles and as points.
 TEST(AmbientOcclusion, leavesAPlaneAsItIs) {
     for (const int triangles : {2, 400000}) {
-        TestScene t(triangles);
+        OcclusionScene t(triangles);
         const Scene& scene = t.build();
         for (const double height : {1.0, 8.0, 30.0}) {
             const FrameRequest r = request(DVec3(0, height, 40), DVec3(0, 0, 0));
@@ -118,8 +88,8 @@ TEST(AmbientOcclusion, leavesAPlaneAsItIs) {
 }
 
 TEST(AmbientOcclusion, wallsHaveNoInside) {
-    TestScene t;
-    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 50, 0), 3.0));
+    OcclusionScene t;
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 50, 0), DVec3(3.0)));
     const Scene& scene = t.build();
     const FrameRequest r = request(DVec3(3, 52, 9), DVec3(0, 50, 0));
     const Image open = render(scene, r, Method::kRaycast, false);
@@ -127,13 +97,13 @@ TEST(AmbientOcclusion, wallsHaveNoInside) {
 }
 
 Scene wood() {
-    TestScene t;
+    OcclusionScene t;
     TreeParams params;
     params.triangles = 4000;
     const uint32_t tree = addMesh(t.scene, makeTree(params));
     for (int i = 0; i < 100; ++i) {
         t.root.instances.add(ChildRef::mesh(tree),
-                             placed(DVec3(6.0 * (i % 10) - 27.0, 0.0, -6.0 * (i / 10)), 1.0));
+                             placed(DVec3(6.0 * (i % 10) - 27.0, 0.0, -6.0 * (i / 10))));
     }
     return t.build();
 }
@@ -165,8 +135,8 @@ TEST(AmbientOcclusion, sameBitsForAnyNumberOfThreadsAndTiles) {
 }
 
 TEST(AmbientOcclusion, everyReconstructionAndOrthographicCamerasTakeIt) {
-    TestScene t;
-    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), 3.0));
+    OcclusionScene t;
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), DVec3(3.0)));
     const Scene& scene = t.build();
     FrameRequest r = request(DVec3(3, 4, 9), DVec3(0, 0.6, 0));
     r.camera.orthographic = true;

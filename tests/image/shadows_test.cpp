@@ -3,56 +3,22 @@
 // in the light; the same bits for any number of threads.
 #include <gtest/gtest.h>
 #include <render/compare.h>
-#include <render/renderer.h>
-#include <scenegraph/procedural/generators.h>
+#include <tests/image/test_scene.h>
 
 namespace stipple {
 namespace {
 
 constexpr int kWidth = 320, kHeight = 200;
 
-uint32_t addMesh(Scene& scene, GeneratedMesh made) {
-    for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(m + scene.materials.size());
-    scene.materials.insert(scene.materials.end(), made.materials.begin(), made.materials.end());
-    scene.meshes.push_back(std::move(made.mesh));
-    return uint32_t(scene.meshes.size() - 1);
-}
-
-Affine placed(const DVec3& at, const DVec3& size, double turn = 0.0) {
-    Affine a;
-    a.linear =
-        DMat3(std::cos(turn), 0, -std::sin(turn), 0, 1, 0, std::sin(turn), 0, std::cos(turn));
-    for (int i = 0; i < 3; ++i) a.linear[i] *= size[i];
-    a.translation = at;
-    return a;
-}
-
 // A plane, and what stands on it.
-struct TestScene {
-    Scene scene;
-    Group root;
-
-    explicit TestScene(const Vec3& to_sun) : TestScene() {
+struct ShadowScene : TestScene {
+    explicit ShadowScene(const Vec3& to_sun) : ShadowScene() {
         scene.lighting.suns.push_back({glm::normalize(to_sun), Vec3(3.0f)});
     }
-    explicit TestScene(const PointLight& lamp) : TestScene() {
+    explicit ShadowScene(const PointLight& lamp) : ShadowScene() {
         scene.lighting.points.push_back(lamp);
     }
-    TestScene() {
-        scene.path = "test";
-        root.instances = InstanceStore(DBox3{DVec3(-500), DVec3(500)});
-        add(makePrimitive("plane", 2, Vec3(0.5f)), placed(DVec3(0.0), DVec3(400.0)));
-    }
-    void add(GeneratedMesh mesh, const Affine& at) {
-        root.instances.add(ChildRef::mesh(addMesh(scene, std::move(mesh))), at);
-    }
-    Scene& build() {
-        scene.root = uint32_t(scene.groups.size());
-        scene.groups.push_back(root);
-        ThreadPool pool(2);
-        buildScene(scene, pool);
-        return scene;
-    }
+    ShadowScene() { add(makePrimitive("plane", 2, Vec3(0.5f)), placed(DVec3(0.0), DVec3(400.0))); }
 };
 
 FrameRequest request(const DVec3& eye = DVec3(3, 4, 9)) {
@@ -110,7 +76,7 @@ void expectShadowsOfRays(const Scene& scene, int least_lit, int least_shaded) {
 class ShadowOfBox : public testing::TestWithParam<float> {};
 
 TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
-    TestScene t(Vec3(-1.0f, GetParam(), 0.3f));
+    ShadowScene t(Vec3(-1.0f, GetParam(), 0.3f));
     t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), DVec3(3.0), 0.5));
     expectShadowsOfRays(t.build(), 20000, 400);
 }
@@ -138,7 +104,7 @@ class ShadowOfLamp : public testing::TestWithParam<PointLight> {};
 
 // The plane begins behind the lamp where it shines aside.
 TEST_P(ShadowOfLamp, liesWhereRaysHaveIt) {
-    TestScene t(GetParam());
+    ShadowScene t(GetParam());
     t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 0.75, 0), DVec3(1.5), 0.5));
     expectShadowsOfRays(t.build(), 10000, 400);
 }
@@ -150,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(lamps, ShadowOfLamp,
 // A ball's lit side has no shadow of its own, and its far side no light, but for the pixels where
 // the light grazes it.
 TEST(Shadows, curvedSurfacesHaveNoAcne) {
-    TestScene t(Vec3(-1.0f, 0.8f, 0.6f));
+    ShadowScene t(Vec3(-1.0f, 0.8f, 0.6f));
     t.add(makePrimitive("sphere", 80000, Vec3(0.6f)), placed(DVec3(0, 1.2, 0), DVec3(2.4)));
     const Scene& scene = t.build();
     FrameRequest r = request();
@@ -174,7 +140,7 @@ TEST(Shadows, curvedSurfacesHaveNoAcne) {
 }
 
 TEST(Shadows, whatStandsBehindTheCameraShadesWhatItSees) {
-    TestScene t(Vec3(0.0f, 0.5f, 1.0f));  // from behind the camera
+    ShadowScene t(Vec3(0.0f, 0.5f, 1.0f));  // from behind the camera
     t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 40, 60), DVec3(200, 80, 2)));
     const Scene& scene = t.build();
     const Image rays = render(scene, request(), Method::kRaycast, true);
@@ -187,7 +153,7 @@ TEST(Shadows, whatStandsBehindTheCameraShadesWhatItSees) {
 
 // Trees in a group that is placed twice, or the same trees in one flat group.
 Scene wood(bool is_nested) {
-    TestScene t(Vec3(-1.0f, 0.9f, 0.4f));
+    ShadowScene t(Vec3(-1.0f, 0.9f, 0.4f));
     TreeParams params;
     params.triangles = 4000;
     const uint32_t tree = addMesh(t.scene, makeTree(params));
@@ -278,7 +244,7 @@ TEST(Shadows, sameBitsForAnyNumberOfThreads) {
 
 // Texels lie still in the world: where the camera goes aside by whole pixels, so does the picture.
 TEST(Shadows, doNotSwimWhenTheCameraMoves) {
-    TestScene t(Vec3(-1.0f, 0.7f, 0.3f));
+    ShadowScene t(Vec3(-1.0f, 0.7f, 0.3f));
     TreeParams params;
     params.triangles = 4000;
     params.height = 6.0;
@@ -306,7 +272,7 @@ TEST(Shadows, doNotSwimWhenTheCameraMoves) {
 }
 
 TEST(Shadows, everyReconstructionTakesThem) {
-    TestScene t(Vec3(-1.0f, 0.7f, 0.3f));
+    ShadowScene t(Vec3(-1.0f, 0.7f, 0.3f));
     t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 0.75, 0), DVec3(1.5), 0.5));
     const Scene& scene = t.build();
     const Image rays = render(scene, request(), Method::kRaycast, true);
