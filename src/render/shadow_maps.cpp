@@ -23,6 +23,11 @@ constexpr float kHazeLeft = 1.0f / 256.0f;
 constexpr float kLeastLight = 1.0f / 1024.0f;
 // What the first look has seen of a lamp's surroundings may reach this far beyond: a factor.
 constexpr float kBehindSeen = 1.1f;
+// Three depths in a row of the look are a plane's if what is left of their slope is less than this
+// share.
+constexpr float kUnevenness = 0.1f;
+// And what floats may lose of a depth.
+constexpr float kRounding = 1e-6f;
 
 // A page in the world: of a level, at whole multiples of its size from the origin.
 struct PageKey {
@@ -42,7 +47,31 @@ void sortUnique(std::vector<PageKey>& pages) {
     pages.erase(std::unique(pages.begin(), pages.end()), pages.end());
 }
 
-// Calls take(place, depth) for what the look has seen, in camera space.
+// Unit normal, in camera space, of the plane that a place of the look and its neighbours lie on;
+// null if they do not.
+Vec3 normalOfPlane(const FirstLook& look, int x, int y) {
+    const View& view = look.view;
+    if (x == 0 || y == 0 || x + 1 == view.width || y + 1 == view.height) return Vec3(0.0f);
+    // What is linear in the picture on a plane.
+    const auto at = [&](int u, int v) {
+        const float depth = look.depth[size_t(v) * size_t(view.width) + size_t(u)];
+        return view.orthographic ? depth : 1.0f / depth;
+    };
+    const float here = at(x, y), left = at(x - 1, y), right = at(x + 1, y), above = at(x, y - 1),
+                below = at(x, y + 1);
+    const float along_x = 0.5f * (right - left), along_y = 0.5f * (below - above);
+    const float most = kUnevenness * (std::abs(along_x) + std::abs(along_y)) + kRounding * here;
+    if (!(std::abs(left + right - 2.0f * here) <= most &&
+          std::abs(above + below - 2.0f * here) <= most))
+        return Vec3(0.0f);
+    const float focal = float(view.focal), from_x = float(x) + 0.5f - float(view.center_x),
+                from_y = float(y) + 0.5f - float(view.center_y);
+    return glm::normalize(view.orthographic ? Vec3(focal * along_x, focal * along_y, -1.0f)
+                                            : Vec3(focal * along_x, focal * along_y,
+                                                   here - from_x * along_x - from_y * along_y));
+}
+
+// Calls take(place, depth, normal) for what the look has seen, in camera space.
 template <class Take>
 void forEachSeen(const FirstLook& look, const Take& take) {
     for (int y = 0; y < look.view.height; ++y) {
@@ -51,9 +80,14 @@ void forEachSeen(const FirstLook& look, const Take& take) {
             if (!(depth < kInfinity)) continue;
             Vec3 origin, direction;
             look.view.ray(float(x) + 0.5f, float(y) + 0.5f, origin, direction);
-            take(origin + direction * depth, depth);
+            take(origin + direction * depth, depth, normalOfPlane(look, x, y));
         }
     }
+}
+
+// Of the angle at which light of that direction meets a plane; 1 where there is none.
+float sineOf(const Vec3& normal, const Vec3& direction) {
+    return normal == Vec3(0.0f) ? 1.0f : std::abs(glm::dot(normal, direction));
 }
 
 // The pages that a map needs, as they are found: places come in rows of the picture, so most are
@@ -135,10 +169,11 @@ private:
         const DMat3 sun_from_camera = sun_from_world * glm::transpose(view_.camera_from_world);
         const DVec3 eye = sun_from_world * view_.eye_world;
         PageSet pages;
-        forEachSeen(look, [&](const Vec3& p_camera, float depth) {
+        const Vec3 direction(glm::transpose(sun_from_camera)[2]);
+        forEachSeen(look, [&](const Vec3& p_camera, float depth, const Vec3& normal) {
             if (glm::length(p_camera) > farthest_) return;
             const DVec3 p = eye + sun_from_camera * DVec3(p_camera);
-            pages.add(p.x, p.y, sizes_.wantedTexel(depth));
+            pages.add(p.x, p.y, sizes_.wantedTexel(depth, sineOf(normal, direction)));
         });
         return drawMap(space, pages.take());
     }
@@ -161,14 +196,16 @@ private:
         std::array<float, kCubeFaces> far_z{};
         std::array<DMat3, kCubeFaces> face_from_lamp;
         for (int f = 0; f < kCubeFaces; ++f) face_from_lamp[size_t(f)] = cubeFaceFromLamp(f);
-        forEachSeen(look, [&](const Vec3& p_camera, float depth) {
+        const Mat3 camera_from_lamp(glm::transpose(lamp_from_camera));
+        forEachSeen(look, [&](const Vec3& p_camera, float depth, const Vec3& normal) {
             if (glm::length(p_camera) > farthest_) return;
             const DVec3 p_lamp = eye + lamp_from_camera * DVec3(p_camera);
             const Vec3 light = incidentLight(lamp, world_from_lamp * Vec3(-p_lamp));
             if (std::max({light.x, light.y, light.z}) * exposure < kLeastLight) return;
             const size_t face = size_t(cubeFaceOf(Vec3(p_lamp)));
             const DVec3 p = face_from_lamp[face] * p_lamp;
-            pages[face].add(p.x / p.z, p.y / p.z, sizes_.wantedTexel(depth) / float(p.z));
+            const float sine = sineOf(normal, camera_from_lamp * Vec3(glm::normalize(p_lamp)));
+            pages[face].add(p.x / p.z, p.y / p.z, sizes_.wantedTexel(depth, sine) / float(p.z));
             far_z[face] = std::max(far_z[face], float(p.z));
         });
         for (size_t f = 0; f < kCubeFaces; ++f) {

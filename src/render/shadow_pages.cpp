@@ -12,6 +12,8 @@ namespace {
 constexpr float kBias = 1.5f;
 // A surface that meets the light at less than this sine is compared as if it met it at this.
 constexpr float kGrazing = 0.1f;
+// Patches wider than so many texels are surfaces that a look at the picture can tell the slope of.
+constexpr float kWideTexels = 8.0f;
 
 // Depth at a texel of the rectangle; NaN where no page is.
 float depthAt(const ShadowLevel& level, int x, int y) {
@@ -94,8 +96,12 @@ float ShadowPages::litShare(const Map& map, const SurfaceSample& sample) const {
     const float size = std::max(std::abs(cosine), kGrazing);
     const float along = cosine < 0.0f ? 1.0f / size : -1.0f / size;
     const float slope_x = normal.x * along, slope_y = normal.y * along;  // of depth, along x and y
-    const int wanted =
-        levelExponent(wantedTexel(sample.depth) / metres) - map.shadow.first_exponent;
+    // Leaves have pages for what they are seen in, not for each of them.
+    const float coarse = wantedTexel(sample.depth, 1.0f);
+    const bool is_wide = sample.patch_width > kWideTexels * coarse;
+    const float sine = std::abs(cosine) * (kIsLamp ? p.z / glm::length(p) : 1.0f);
+    const float wanted_texel = is_wide ? wantedTexel(sample.depth, sine) : coarse;
+    const int wanted = levelExponent(wanted_texel / metres) - map.shadow.first_exponent;
     for (size_t i = size_t(std::max(wanted, 0)); i < levels.size(); ++i) {
         const ShadowLevel& level = levels[i];
         if (level.columns == 0) continue;

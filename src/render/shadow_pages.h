@@ -10,6 +10,7 @@
 #include <core/light.h>
 #include <core/light_visibility.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -65,13 +66,17 @@ public:
     float ofSun(size_t sun, const SurfaceSample& sample) const override;
     float ofLamp(size_t lamp, const SurfaceSample& sample) const override;
 
-    // Side of a texel that a surface at a depth asks for, metres.
-    float wantedTexel(float depth) const {
-        return orthographic_ ? texel_per_depth_ : texel_per_depth_ * depth;
+    // Side of a texel that a surface at a depth asks for, metres. Where the light meets it at a
+    // small sine a texel covers more of it, so it asks for finer ones.
+    float wantedTexel(float depth, float sine) const {
+        const float share = std::clamp(2.0f * sine, kFinestShare, 1.0f);
+        return share * (orthographic_ ? texel_per_depth_ : texel_per_depth_ * depth);
     }
     size_t bytes() const;
 
 private:
+    static constexpr float kFinestShare = 0.25f;
+
     struct Map {
         ShadowMap shadow;
         Mat3 light_from_camera = Mat3(1.0f), light_from_world = Mat3(1.0f);

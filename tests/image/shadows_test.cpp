@@ -81,6 +81,16 @@ TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
     expectShadowsOfRays(t.build(), 20000, 400);
 }
 
+// The shadow's far edge: there a texel of the sun's width would cover four pixels of the plane.
+TEST(Shadows, ofASlabUnderALowSunLiesWhereRaysHaveIt) {
+    for (const double height : {0.15, 0.3, 0.5}) {
+        ShadowScene t(Vec3(-1.0f, 0.25f, 0.3f));
+        t.add(makePrimitive("box", 12, Vec3(0.6f)),
+              placed(DVec3(0, 0.5 * height, 0), DVec3(3.0, height, 3.0)));
+        expectShadowsOfRays(t.build(), 20000, 20);
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(heights, ShadowOfBox, testing::Values(2.0f, 0.7f, 0.25f));
 
 PointLight spotAt(const DVec3& place, const DVec3& target) {
