@@ -4,12 +4,13 @@
 // and may ask to see them several times (passes).
 #pragma once
 
+#include <core/ambient_visibility.h>
 #include <core/light.h>
+#include <core/light_visibility.h>
 #include <core/material.h>
 #include <core/points.h>
 #include <core/raster_job.h>
 #include <core/settings.h>
-#include <core/sun_visibility.h>
 #include <reconstruct/picture.h>
 
 #include <memory>
@@ -30,8 +31,9 @@ struct ReconstructionContext {
     RenderSettings settings;
     const std::vector<Material>* materials = nullptr;
     const Lighting* lighting = nullptr;
-    const RasterTarget* base = nullptr;             // rasterized triangles; nullptr: none
-    const SunVisibility* sun_visibility = nullptr;  // nullptr: nothing casts shadows
+    const RasterTarget* base = nullptr;                     // rasterized triangles; nullptr: none
+    const LightVisibility* light_visibility = nullptr;      // nullptr: nothing casts shadows
+    const AmbientVisibility* ambient_visibility = nullptr;  // nullptr: all is open
     Picture* picture = nullptr;
 };
 

@@ -140,7 +140,7 @@ Vec3 skyRadiance(const Sky& sky, const Vec3& direction) {
 }
 
 Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
-           const View& view, const SunVisibility* visibility) {
+           const View& view, const LightVisibility* lights, const AmbientVisibility* ambient) {
     if (material.unlit) return sample.albedo;
     const Vec3 to_eye_camera =
         view.orthographic ? Vec3(0.0f, 0.0f, -1.0f) : -sample.position_camera;
@@ -150,11 +150,16 @@ Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting
     if (material.double_sided && glm::dot(n, to_eye) < 0.0f) n = -n;
 
     const SurfaceFinish& finish = sample.finish;
-    const Vec3 sky = skyAmbient(lighting.sky, n);
+    const float open = ambient ? ambient->of(sample, n) : 1.0f;
+    const Vec3 sky = skyAmbient(lighting.sky, n) * open;
     const Vec3 through = sample.albedo * ((1.0f - finish.metallic) * material.translucency);
     const Vec3 scattered =
         sample.albedo * ((1.0f - finish.metallic) * (1.0f - material.translucency));
-    Vec3 radiance = finish.emissive + skyAmbient(lighting.sky, -n) * through;
+    Vec3 radiance = finish.emissive;
+    if (through != Vec3(0.0f)) {
+        const float open_behind = ambient ? ambient->of(sample, -n) : 1.0f;
+        radiance += skyAmbient(lighting.sky, -n) * through * open_behind;
+    }
     const Fresnel fresnel(sample.albedo, finish);
     if (fresnel.isNone()) {
         radiance += sky * scattered;
@@ -165,7 +170,7 @@ Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting
         const Vec3 direction = glm::normalize(2.0f * n_v * n - to_eye);
         const Vec3 mirrored = glm::mix(skyRadiance(lighting.sky, direction),
                                        skyAmbient(lighting.sky, direction), finish.roughness);
-        radiance += mirrored * share + sky * scattered * (1.0f - largest(share));
+        radiance += mirrored * share * open + sky * scattered * (1.0f - largest(share));
     }
     // irradiance: on a surface that faces the light.
     const auto addLight = [&](const Vec3& direction_to_light, const Vec3& irradiance) {
@@ -184,16 +189,20 @@ Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting
     for (size_t i = 0; i < lighting.suns.size(); ++i) {
         const Sun& sun = lighting.suns[i];
         if (through == Vec3(0.0f) && glm::dot(n, sun.direction_to_light) <= 0.0f) continue;
-        const float visible = visibility ? visibility->of(i, sample) : 1.0f;
+        const float visible = lights ? lights->ofSun(i, sample) : 1.0f;
         if (visible > 0.0f) addLight(sun.direction_to_light, sun.irradiance * visible);
     }
     if (!lighting.points.empty()) {
         const Vec3 from_eye = Mat3(glm::transpose(view.camera_from_world)) * sample.position_camera;
-        for (const PointLight& light : lighting.points) {
+        for (size_t i = 0; i < lighting.points.size(); ++i) {
+            const PointLight& light = lighting.points[i];
             // Relative to the eye, so that floats do far from the origin too.
             const Vec3 to_light = Vec3(light.position - view.eye_world) - from_eye;
             const Vec3 irradiance = incidentLight(light, to_light);
-            if (irradiance != Vec3(0.0f)) addLight(glm::normalize(to_light), irradiance);
+            if (irradiance == Vec3(0.0f)) continue;
+            if (through == Vec3(0.0f) && glm::dot(n, to_light) <= 0.0f) continue;
+            const float visible = lights ? lights->ofLamp(i, sample) : 1.0f;
+            if (visible > 0.0f) addLight(glm::normalize(to_light), irradiance * visible);
         }
     }
     if (lighting.sky.haze_distance > 0.0f) {

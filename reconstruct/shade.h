@@ -5,18 +5,21 @@
 // Based on: Khronos. glTF 2.0 Specification. 2021 (appendix B: BRDF Implementation).
 #pragma once
 
+#include <core/ambient_visibility.h>
 #include <core/camera.h>
 #include <core/light.h>
+#include <core/light_visibility.h>
 #include <core/material.h>
-#include <core/sun_visibility.h>
 #include <core/surface.h>
 
 namespace stipple {
 
 // Radiance towards the eye, linear. The sample's normal is turned towards the viewer for
-// double-sided materials. visibility: of the suns; null: nothing casts shadows.
+// double-sided materials. lights: null: nothing casts shadows. ambient: darkens what comes from sky
+// or environment; null: nothing does.
 Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
-           const View& view, const SunVisibility* visibility = nullptr);
+           const View& view, const LightVisibility* lights = nullptr,
+           const AmbientVisibility* ambient = nullptr);
 
 // The two parts of a surface's BRDF, without translucency: what a light's irradiance on a surface
 // that faces it is multiplied with, but for the cosine. normal, to_light, to_eye: unit vectors;

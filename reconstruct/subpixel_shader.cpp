@@ -7,7 +7,7 @@ namespace stipple {
 
 Vec3 SubpixelShader::shadeSample(const SurfaceSample& sample) const {
     return shade(sample, (*context_.materials)[sample.material], *context_.lighting, context_.view,
-                 context_.sun_visibility);
+                 context_.light_visibility, context_.ambient_visibility);
 }
 
 void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y) {
@@ -32,7 +32,8 @@ void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y
 bool SubpixelShader::showAll(const SampleLookup& lookup, const Cell& cell, int first,
                              uint32_t members) {
     const uint32_t number = cell.number[first];
-    if (members == uint32_t(1) << first || context_.sun_visibility || number == varied_number_)
+    if (members == uint32_t(1) << first || context_.light_visibility ||
+        context_.ambient_visibility || number == varied_number_)
         return false;
     // Of a plane 1 / depth (orthographic: depth) is affine in the picture.
     const bool orthographic = context_.view.orthographic;

@@ -64,6 +64,54 @@ inline __attribute__((always_inline)) void projectBlock(const View& view,
     }
 }
 
+// Whether all corners lie before near_z or beyond the same side of the tile, in perspective.
+bool misses(const View& view, const SubpixelRect& rect, const Vec3 (&corners)[3]) {
+    const float cx = float(view.center_x), cy = float(view.center_y);
+    const Vec3 sides[4] = {{view.focal, 0.0f, cx - float(rect.x0)},
+                           {-view.focal, 0.0f, float(rect.x1) - cx},
+                           {0.0f, view.focal, cy - float(rect.y0)},
+                           {0.0f, -view.focal, float(rect.y1) - cy}};
+    const auto areAllOutside = [&](const auto& isOutside) {
+        return isOutside(corners[0]) && isOutside(corners[1]) && isOutside(corners[2]);
+    };
+    bool is_missed = areAllOutside([&](const Vec3& p) { return p.z < view.near_z; });
+    for (const Vec3& side : sides)
+        is_missed |= areAllOutside([&](const Vec3& p) { return glm::dot(side, p) < 0.0f; });
+    return is_missed;
+}
+
+// A triangle that begins before near_z, in perspective: by rays through the centres, as its corners
+// have no place in the picture. Based on: Olano, Greer. Triangle Scan Conversion using 2D
+// Homogeneous Coordinates. 1997.
+uint64_t rasterizeFromNear(const View& view, const TriangleBlock& block, int i, DepthTile& tile) {
+    const Vec3 corners[3] = {block.vertex(0, i), block.vertex(1, i), block.vertex(2, i)};
+    if (misses(view, tile.rect(), corners)) return 0;
+    const Vec3 &a = corners[0], &b = corners[1], &c = corners[2];
+    const Vec3 normal = glm::cross(b - a, c - a);
+    const float height = glm::dot(normal, a);
+    const Vec3 edges[3] = {glm::cross(b, c), glm::cross(c, a), glm::cross(a, b)};
+    const uint32_t number = (block.first_number + uint32_t(i)) | (block.is_wide ? kSurfaceBit : 0);
+    const SubpixelRect& rect = tile.rect();
+    for (int y = rect.y0; y < rect.y1; ++y) {
+        uint64_t* row = tile.row(y);
+        for (int x = rect.x0; x < rect.x1; ++x) {
+            const float sub_x = float(x) + 0.5f, sub_y = float(y) + 0.5f;
+            Vec3 origin, direction;
+            view.ray(sub_x, sub_y, origin, direction);
+            const float depth = height / glm::dot(normal, direction);
+            if (!(depth >= view.near_z && depth < kInfinity)) continue;
+            // The share of each corner where the ray meets the plane.
+            const float ua = glm::dot(edges[0], direction), ub = glm::dot(edges[1], direction),
+                        uc = glm::dot(edges[2], direction), inverse = 1.0f / (ua + ub + uc);
+            if (std::min(std::min(ua * inverse, ub * inverse), uc * inverse) < kInside) continue;
+            const uint64_t key = DepthTile::pack(depth, number);
+            if (key < row[x] && (!block.mask || block.mask->isSurface(i, sub_x, sub_y)))
+                row[x] = key;
+        }
+    }
+    return uint64_t(rect.width()) * uint64_t(rect.height());
+}
+
 template <bool kOrthographic>
 inline __attribute__((always_inline)) uint64_t rasterize(const View& view,
                                                          const TriangleBlock& block,
@@ -72,6 +120,10 @@ inline __attribute__((always_inline)) uint64_t rasterize(const View& view,
     projectBlock<kOrthographic>(view, block, tile.rect(), p);
     uint64_t visited = 0;
     for (int i = 0; i < block.count; ++i) {
+        if (!kOrthographic && p.z_min[i] < view.near_z) {
+            visited += rasterizeFromNear(view, block, i, tile);
+            continue;
+        }
         const int x0 = p.x0[i], x1 = p.x1[i], y0 = p.y0[i], y1 = p.y1[i];
         const float inverse = p.inverse_area[i];
         if (x0 > x1 || y0 > y1 || inverse == 0.0f) continue;

@@ -30,6 +30,9 @@ struct PointLight {
     float outer_cone = 0.7853982f;  // ... and none from here; inner_cone < outer_cone <= pi / 2
 };
 
+// What is nearer to a point or spot light than this is part of it and casts no shadow: metres.
+inline constexpr float kLampClearance = 0.01f;
+
 // Irradiance on a surface at `to_light` from the light that faces it (to_light: metres from there
 // to the light's position, not 0).
 Vec3 incidentLight(const PointLight& light, const Vec3& to_light);

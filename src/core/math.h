@@ -26,6 +26,14 @@ inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 inline double radians(double degrees) { return degrees * (kPi / 180.0); }
 
+// Two unit vectors that with the unit vector n are a right-handed frame (u, v, n). Based on: Duff
+// et al. Building an Orthonormal Basis, Revisited. 2017.
+inline void tangents(const Vec3& n, Vec3& u, Vec3& v) {
+    const float sign = std::copysign(1.0f, n.z), a = -1.0f / (sign + n.z), b = n.x * n.y * a;
+    u = Vec3(1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x);
+    v = Vec3(b, sign + n.y * n.y * a, -n.y);
+}
+
 // Axis-aligned box. Empty (min > max) by default; extend() makes it grow.
 template <class V>
 struct BoxT {

@@ -109,9 +109,9 @@ public:
     virtual bool isSurface(int triangle, float sub_x, float sub_y) const = 0;
 };
 
-// Up to 64 triangles in camera space, all with z > 0: too large for points, too small for the
-// z-buffer of the large ones. Triangle i has the number first_number + i within its tile (with
-// kTriangleBit).
+// Up to 64 triangles in camera space: too large for points, too small for the z-buffer of the large
+// ones; without such a z-buffer, any size, and what is nearer than the view's near_z is cut off.
+// Triangle i has the number first_number + i within its tile (with kTriangleBit).
 struct TriangleBlock {
     int count = 0;
     uint32_t first_number = 0;

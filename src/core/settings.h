@@ -36,6 +36,8 @@ struct RenderSettings {
     bool shadows = false;
     double shadow_texel = 1.0;  // side of a shadow map's texel where it is seen, pixels
     bool ao = false;
+    double ao_radius = 2.0;   // metres: what is farther occludes nothing
+    int ao_rays = 16;         // raycast: a hit and side
     double exposure = 0.0;    // stops, beside the scene's
     Tone tone = Tone::kNone;  // of pictures that are shown (PNG)
     uint64_t seed = 1;

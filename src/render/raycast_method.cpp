@@ -20,53 +20,122 @@ constexpr size_t kBatchRays = 256;
 struct RayBatch {
     std::vector<Ray> rays;
     std::vector<PixelSums*> sums;  // where each ray belongs; a pixel's rays are in order
+    std::vector<uint64_t> keys;    // of random numbers, of each ray
     std::vector<RayHit> hits;
 };
 
-// Shadows by their definition: a ray from every hit to every sun.
-class ShadowRays : public SunVisibility {
+// How far off a surface secondary rays begin: what floats lose at that distance from the eye.
+float offsetFrom(const Vec3& p) { return 1e-5f * std::max(glm::length(p), 0.01f); }
+
+// Shadows by their definition: a ray from every hit to every light that may reach it.
+class ShadowRays : public LightVisibility {
 public:
-    ShadowRays(const RayCaster& caster, const std::vector<Sun>& suns)
-        : caster_(caster), suns_(suns) {}
+    ShadowRays(const RayCaster& caster, const Lighting& lighting, const DVec3& eye_world)
+        : caster_(caster),
+          lighting_(lighting),
+          eye_world_(eye_world),
+          n_lights_(lighting.suns.size() + lighting.points.size()) {}
 
     // For the hits of `rays`.
     void cast(const std::vector<Ray>& rays, const std::vector<RayHit>& hits) {
-        is_hidden_.resize(suns_.size() * rays.size());
-        for (size_t s = 0; s < suns_.size(); ++s) {
-            to_sun_.clear();
+        is_hidden_.assign(n_lights_ * rays.size(), 0);
+        for (size_t light = 0; light < n_lights_; ++light) {
+            to_light_.clear();
             ray_of_.clear();
             for (size_t r = 0; r < rays.size(); ++r) {
-                if (!(hits[r].t < kInfinity)) continue;
-                to_sun_.push_back(rayToSun(rays[r], hits[r], suns_[s].direction_to_light));
-                ray_of_.push_back(r);
+                if (hits[r].t < kInfinity && addRay(rays[r], hits[r], light)) ray_of_.push_back(r);
             }
-            hit_.resize(to_sun_.size());
-            caster_.occluded(to_sun_.data(), to_sun_.size(), hit_.data());
+            hit_.resize(to_light_.size());
+            caster_.occluded(to_light_.data(), to_light_.size(), hit_.data());
             for (size_t i = 0; i < ray_of_.size(); ++i)
-                is_hidden_[ray_of_[i] * suns_.size() + s] = hit_[i];
+                is_hidden_[ray_of_[i] * n_lights_ + light] = hit_[i];
         }
     }
     void select(size_t ray) { ray_ = ray; }
-    float of(size_t sun, const SurfaceSample&) const override {
-        return is_hidden_[ray_ * suns_.size() + sun] ? 0.0f : 1.0f;
+    float ofSun(size_t sun, const SurfaceSample&) const override { return visible(sun); }
+    float ofLamp(size_t lamp, const SurfaceSample&) const override {
+        return visible(lighting_.suns.size() + lamp);
     }
 
 private:
-    // Begins off the surface by what floats lose at that distance from the eye.
-    static Ray rayToSun(const Ray& ray, const RayHit& hit, const Vec3& to_sun) {
-        constexpr float kOffset = 1e-5f;
+    float visible(size_t light) const { return is_hidden_[ray_ * n_lights_ + light] ? 0.0f : 1.0f; }
+
+    // False if a lamp does not shine there, or is there.
+    bool addRay(const Ray& ray, const RayHit& hit, size_t light) {
         const Vec3 p = ray.origin + ray.direction * hit.t;
-        const float offset = kOffset * std::max(glm::length(p), 0.01f);
-        const float side = glm::dot(hit.normal_world, to_sun) < 0.0f ? -1.0f : 1.0f;
-        return {p + hit.normal_world * (side * offset), 2.0f * offset, to_sun, kInfinity};
+        const float offset = offsetFrom(p);
+        Vec3 direction;
+        float end = kInfinity;
+        if (light < lighting_.suns.size()) {
+            direction = lighting_.suns[light].direction_to_light;
+        } else {
+            const PointLight& lamp = lighting_.points[light - lighting_.suns.size()];
+            const Vec3 to_lamp = Vec3(lamp.position - eye_world_) - p;
+            if (incidentLight(lamp, to_lamp) == Vec3(0.0f)) return false;
+            const float distance = glm::length(to_lamp);
+            direction = to_lamp / distance;
+            end = distance - kLampClearance;
+            if (end <= 2.0f * offset) return false;
+        }
+        const float side = glm::dot(hit.normal_world, direction) < 0.0f ? -1.0f : 1.0f;
+        to_light_.push_back(
+            {p + hit.normal_world * (side * offset), 2.0f * offset, direction, end});
+        return true;
     }
 
     const RayCaster& caster_;
-    const std::vector<Sun>& suns_;
-    std::vector<Ray> to_sun_;
+    const Lighting& lighting_;
+    DVec3 eye_world_;
+    size_t n_lights_;
+    std::vector<Ray> to_light_;
     std::vector<size_t> ray_of_;
     std::vector<uint8_t> hit_, is_hidden_;
     size_t ray_ = 0;
+};
+
+// Ambient occlusion by its definition: rays as long as the radius from every hit.
+class AmbientRays : public AmbientVisibility {
+public:
+    AmbientRays(const RayCaster& caster, const RenderSettings& settings)
+        : caster_(caster), radius_(float(settings.ao_radius)), n_rays_(size_t(settings.ao_rays)) {
+        rays_.reserve(n_rays_);
+        is_hit_.resize(n_rays_);
+    }
+
+    // The place of the hit, relative to the eye, and a key for its random directions.
+    void select(const Vec3& p, uint64_t key) { p_ = p, key_ = key; }
+    // From the end of each ray to the hit: what the hit would see stops it, so that the inside of a
+    // wall does not.
+    float of(const SurfaceSample&, const Vec3& normal) const override {
+        const float offset = offsetFrom(p_);
+        Vec3 u, v;
+        tangents(normal, u, v);
+        rays_.clear();
+        for (size_t i = 0; i < n_rays_; ++i) {
+            const uint64_t h = hashCombine(key_, i);
+            const float share = (float(i) + uniformFloat(h)) / float(n_rays_);
+            const float azimuth = 2.0f * float(kPi) * uniformFloat(mixBits(h));
+            const Vec3 direction =
+                normal * std::sqrt(1.0f - share) +
+                (u * std::cos(azimuth) + v * std::sin(azimuth)) * std::sqrt(share);
+            const Vec3 from = p_ + normal * offset;
+            rays_.push_back({from + direction * radius_, 0.0f, -direction,
+                             std::max(radius_ - 2.0f * offset, 0.0f)});
+        }
+        caster_.occluded(rays_.data(), rays_.size(), is_hit_.data());
+        size_t n_open = 0;
+        for (const uint8_t is_hit : is_hit_) n_open += !is_hit;
+        return float(n_open) / float(n_rays_);
+    }
+
+private:
+    const RayCaster& caster_;
+    float radius_;
+    size_t n_rays_;
+    Vec3 p_ = Vec3(0);
+    uint64_t key_ = 0;
+    mutable std::vector<Ray> rays_;  // one instance a thread
+    mutable std::vector<uint8_t> is_hit_;
 };
 
 // Offset of ray i of n in the pixel, in [0,1)^2: jittered in the cells of the squarest grid that n
@@ -100,7 +169,8 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
     std::atomic<size_t> done{0};
     std::mutex progress_mutex;
     const bool has_shadows = request.settings.shadows;
-    const auto castAndShade = [&](RayBatch& batch, ShadowRays& shadows) {
+    const bool has_ao = request.settings.ao;
+    const auto castAndShade = [&](RayBatch& batch, ShadowRays& shadows, AmbientRays& ambient) {
         batch.hits.resize(batch.rays.size());
         caster.cast(batch.rays.data(), batch.rays.size(), batch.hits.data(), footprint);
         if (has_shadows) shadows.cast(batch.rays, batch.hits);
@@ -113,20 +183,22 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
             }
             SurfaceSample sample;
             sample.depth = hit.t;
-            sample.position_camera =
-                camera_from_world * (batch.rays[r].origin + batch.rays[r].direction * hit.t);
+            const Vec3 p = batch.rays[r].origin + batch.rays[r].direction * hit.t;
+            sample.position_camera = camera_from_world * p;
             sample.normal_world = hit.normal_world;
             sample.albedo = hit.albedo;
             sample.finish = hit.finish;
             sample.material = hit.material;
             sample.object = hit.object;
             shadows.select(r);
+            ambient.select(p, batch.keys[r]);
             sum.add(sample, shade(sample, materials[hit.material], lighting, view,
-                                  has_shadows ? &shadows : nullptr));
+                                  has_shadows ? &shadows : nullptr, has_ao ? &ambient : nullptr));
             sum.points += 1.0f;
         }
         batch.rays.clear();
         batch.sums.clear();
+        batch.keys.clear();
     };
     pool.forEach(size_t(columns) * size_t(rows), [&](size_t t, int) {
         if (request.cancel && request.cancel->requested) return;
@@ -139,7 +211,8 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
         std::vector<PixelSums> sums(kTilePixels * kTilePixels);
         RayBatch batch;
         std::array<uint64_t, kLargestBlock * kLargestBlock> pixel_keys;
-        ShadowRays shadows(caster, lighting.suns);
+        ShadowRays shadows(caster, lighting, view.eye_world);
+        AmbientRays ambient(caster, request.settings);
         for (int by = y0; by < y1; by += side) {
             for (int bx = x0; bx < x1; bx += side) {
                 const int ex = std::min(bx + side, x1), ey = std::min(by + side, y1);
@@ -158,17 +231,18 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
                             view.ray((float(x) + o.x) * s, (float(y) + o.y) * s, origin, direction);
                             batch.rays.push_back({world_from_camera * origin, view.near_z,
                                                   world_from_camera * direction, view.far_z});
+                            batch.keys.push_back(hashCombine(keyOf(x, y), uint64_t(i)));
                             batch.sums.push_back(
                                 &sums[size_t(y - y0) * kTilePixels + size_t(x - x0)]);
                         }
                     }
                     if (batch.rays.size() < kBatchRays) continue;
                     if (request.cancel && request.cancel->requested) return;
-                    castAndShade(batch, shadows);
+                    castAndShade(batch, shadows, ambient);
                 }
             }
         }
-        castAndShade(batch, shadows);
+        castAndShade(batch, shadows, ambient);
         for (int y = y0; y < y1; ++y) {
             for (int x = x0; x < x1; ++x)
                 picture.write(x, y, sums[size_t(y - y0) * kTilePixels + size_t(x - x0)]);

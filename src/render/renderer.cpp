@@ -5,6 +5,7 @@
 #include <raster/rasterizer.h>
 #include <raycast/embree_raycaster.h>
 #include <render/raycast_method.h>
+#include <render/screen_occlusion.h>
 #include <render/shadow_maps.h>
 #include <render/tile_loop.h>
 #include <sampling/random_sampler.h>
@@ -22,6 +23,14 @@ std::vector<RasterMesh> rasterMeshes(const Scene& scene) {
     }
     return meshes;
 }
+
+// Pixels along a side of one of the first look's: pages of shadows are found by a coarse one.
+constexpr int kShadowLookPixels = 4, kOcclusionLookPixels = 1;
+
+struct Visibility {
+    std::unique_ptr<LightVisibility> lights;     // null: nothing casts shadows
+    std::unique_ptr<AmbientVisibility> ambient;  // null: all is open
+};
 
 }  // namespace
 
@@ -47,29 +56,44 @@ struct Renderer::Impl {
         return &target;
     }
 
-    // Shadow maps, if asked for and anything casts shadows. Before the frame's own plan: the
+    // What shading must know of what lies elsewhere, if asked for. Before the frame's own plan: the
     // sampler has one at a time.
-    std::unique_ptr<SunVisibility> makeShadows(const FrameRequest& request, const View& view,
-                                               FrameStats& stats) {
-        if (!request.settings.shadows || scene.lighting.suns.empty()) return nullptr;
-        if (request.progress) request.progress("shadows", 0.0);
-        const auto rasterize = [&](const View& v, const FramePlan& plan) {
+    Visibility makeVisibility(const FrameRequest& request, const View& view, FrameStats& stats) {
+        Visibility visibility;
+        const bool has_shadows = request.settings.shadows &&
+                                 (!scene.lighting.suns.empty() || !scene.lighting.points.empty());
+        if (!has_shadows && !request.settings.ao) return visibility;
+        const RasterizeLarge rasterize = [&](const View& v, const FramePlan& plan) {
             return rasterizePlan(v, plan);
         };
-        return makeShadowMaps(scene, view, sampler, rasterize, pool, request, stats);
+        DepthDrawer drawer = {sampler, rasterize, pool, request, "look"};
+        if (request.progress) request.progress("look", 0.0);
+        FirstLook look = takeFirstLook(
+            view, request.settings.ao ? kOcclusionLookPixels : kShadowLookPixels, drawer, stats);
+        if (has_shadows) {
+            drawer.phase = "shadows";
+            if (request.progress) request.progress("shadows", 0.0);
+            visibility.lights = makeShadowMaps(scene, view, look, drawer, stats);
+        }
+        if (request.settings.ao) {
+            visibility.ambient = std::make_unique<ScreenOcclusion>(view, std::move(look),
+                                                                   request.settings.ao_radius);
+        }
+        return visibility;
     }
 
     // From the plan to the picture: large triangles to the z-buffer, points to the tiles, both into
     // one depth test.
     void drawPlan(const FrameRequest& request, const View& view, const FramePlan& plan,
-                  PointSource* source, const SunVisibility* shadows, Picture& picture,
+                  PointSource* source, const Visibility& visibility, Picture& picture,
                   FrameStats& stats) {
         ReconstructionContext context;
         context.view = view;
         context.settings = request.settings;
         context.materials = &scene.materials;
         context.lighting = &scene.lighting;
-        context.sun_visibility = shadows;
+        context.light_visibility = visibility.lights.get();
+        context.ambient_visibility = visibility.ambient.get();
         context.picture = &picture;
         const Stopwatch raster_watch;
         context.base = rasterizePlan(view, plan);
@@ -86,12 +110,12 @@ struct Renderer::Impl {
 
     void drawPoints(const FrameRequest& request, const View& view, Picture& picture,
                     FrameStats& stats) {
-        const std::unique_ptr<SunVisibility> shadows = makeShadows(request, view, stats);
+        const Visibility visibility = makeVisibility(request, view, stats);
         if (request.progress) request.progress("plan", 0.0);
         const Stopwatch plan_watch;
         const FramePlan& plan = sampler.plan(view, request.settings, pool, request.cancel);
         stats.phases.emplace_back("plan", plan_watch.seconds());
-        drawPlan(request, view, plan, &sampler, shadows.get(), picture, stats);
+        drawPlan(request, view, plan, &sampler, visibility, picture, stats);
         stats.cache_bytes = sampler.cacheBytes();
     }
 
@@ -106,11 +130,11 @@ struct Renderer::Impl {
                           triangles);
             throw Error(ErrorCode::kInvalidArgument, "", message);
         }
-        const std::unique_ptr<SunVisibility> shadows = makeShadows(request, view, stats);
+        const Visibility visibility = makeVisibility(request, view, stats);
         const Stopwatch plan_watch;
         const FramePlan plan = planFrame(scene, view, request.settings, true, pool, request.cancel);
         stats.phases.emplace_back("plan", plan_watch.seconds());
-        drawPlan(request, view, plan, nullptr, shadows.get(), picture, stats);
+        drawPlan(request, view, plan, nullptr, visibility, picture, stats);
     }
 
     void drawRaycast(const FrameRequest& request, const View& view, Picture& picture,

@@ -21,9 +21,9 @@ namespace stipple {
 inline constexpr double kZBufferLimit = 1e9;
 
 struct FrameStats {
-    // As they came, seconds: build, shadows, plan, raster and, as means of the threads' times, draw
-    // and reconstruct, which shading is part of; with raycast build and draw, which shading is part
-    // of.
+    // As they came, seconds: build, look, shadows, plan, raster and, as means of the threads'
+    // times, draw and reconstruct, which shading is part of; with raycast build and draw, which
+    // shading is part of.
     std::vector<std::pair<std::string, double>> phases;
     double seconds = 0.0;       // from view to shaded picture
     uint64_t points_drawn = 0;  // emitted, once for each tile whose halo their node reaches; rays
@@ -35,6 +35,7 @@ struct FrameStats {
     uint64_t large_triangles = 0;  // given to the z-buffer
     uint64_t small_triangles = 0;  // rasterized in tiles
     double overestimation = 0.0;   // points_drawn / points_kept; 0 without points
+    uint64_t look_points = 0;      // drawn for the first look (shadow maps, ambient occlusion)
     uint64_t shadow_points = 0;    // drawn into shadow maps
     size_t shadow_bytes = 0;       // of shadow maps
     size_t cache_bytes = 0;        // of the point lists

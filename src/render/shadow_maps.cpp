@@ -2,8 +2,6 @@
 #include <render/shadow_maps.h>
 
 #include <core/stopwatch.h>
-#include <reconstruct/depth_only.h>
-#include <render/tile_loop.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +10,6 @@ namespace stipple {
 
 namespace {
 
-// The first look has a subpixel for so many pixels along a side.
-constexpr int kLookPixels = 4;
 // What the first look has seen may reach this far beyond: texels.
 constexpr double kPageMargin = 8.0;
 // A level's pages lie within a rectangle of at most so many along a side; farther apart, they are
@@ -23,6 +19,15 @@ constexpr int64_t kMostPagesAlong = 1024;
 constexpr int kSpareLevels = 2;
 // Below this share of its colour nothing is seen through haze.
 constexpr float kHazeLeft = 1.0f / 256.0f;
+// A lamp that gives a white surface less radiance than this, as exposed, casts no shadow there.
+constexpr float kLeastLight = 1.0f / 1024.0f;
+// What the first look has seen of a lamp's surroundings may reach this far beyond: a factor.
+constexpr float kBehindSeen = 1.1f;
+// Three depths in a row of the look are a plane's if what is left of their slope is less than this
+// share.
+constexpr float kUnevenness = 0.1f;
+// And what floats may lose of a depth.
+constexpr float kRounding = 1e-6f;
 
 // A page in the world: of a level, at whole multiples of its size from the origin.
 struct PageKey {
@@ -42,132 +47,181 @@ void sortUnique(std::vector<PageKey>& pages) {
     pages.erase(std::unique(pages.begin(), pages.end()), pages.end());
 }
 
-// What is visible at low resolution.
-struct Look {
-    View view;
-    std::vector<float> depth;  // a subpixel
-};
+// Unit normal, in camera space, of the plane that a place of the look and its neighbours lie on;
+// null if they do not.
+Vec3 normalOfPlane(const FirstLook& look, int x, int y) {
+    const View& view = look.view;
+    if (x == 0 || y == 0 || x + 1 == view.width || y + 1 == view.height) return Vec3(0.0f);
+    // What is linear in the picture on a plane.
+    const auto at = [&](int u, int v) {
+        const float depth = look.depth[size_t(v) * size_t(view.width) + size_t(u)];
+        return view.orthographic ? depth : 1.0f / depth;
+    };
+    const float here = at(x, y), left = at(x - 1, y), right = at(x + 1, y), above = at(x, y - 1),
+                below = at(x, y + 1);
+    const float along_x = 0.5f * (right - left), along_y = 0.5f * (below - above);
+    const float most = kUnevenness * (std::abs(along_x) + std::abs(along_y)) + kRounding * here;
+    if (!(std::abs(left + right - 2.0f * here) <= most &&
+          std::abs(above + below - 2.0f * here) <= most))
+        return Vec3(0.0f);
+    const float focal = float(view.focal), from_x = float(x) + 0.5f - float(view.center_x),
+                from_y = float(y) + 0.5f - float(view.center_y);
+    return glm::normalize(view.orthographic ? Vec3(focal * along_x, focal * along_y, -1.0f)
+                                            : Vec3(focal * along_x, focal * along_y,
+                                                   here - from_x * along_x - from_y * along_y));
+}
 
-class ShadowBuilder {
-public:
-    ShadowBuilder(const Scene& scene, const View& view, RandomizedSampler& sampler,
-                  const RasterizeLarge& rasterize, ThreadPool& pool, const FrameRequest& request)
-        : scene_(scene),
-          view_(view),
-          sampler_(sampler),
-          rasterize_(rasterize),
-          pool_(pool),
-          request_(request) {
-        const DBox3 bounds = sceneBounds(scene);
-        bounds_min_ = bounds.min;
-        bounds_max_ = bounds.max;
+// Calls take(place, depth, normal) for what the look has seen, in camera space.
+template <class Take>
+void forEachSeen(const FirstLook& look, const Take& take) {
+    for (int y = 0; y < look.view.height; ++y) {
+        for (int x = 0; x < look.view.width; ++x) {
+            const float depth = look.depth[size_t(y) * size_t(look.view.width) + size_t(x)];
+            if (!(depth < kInfinity)) continue;
+            Vec3 origin, direction;
+            look.view.ray(float(x) + 0.5f, float(y) + 0.5f, origin, direction);
+            take(origin + direction * depth, depth, normalOfPlane(look, x, y));
+        }
     }
+}
 
-    std::unique_ptr<ShadowPages> build(FrameStats& stats) {
-        const Look look = lookAtScene();
-        std::vector<SunShadow> suns;
-        for (const Sun& sun : scene_.lighting.suns) suns.push_back(drawSun(sun, look));
-        stats.shadow_points += drawn_.points_drawn;
-        return std::make_unique<ShadowPages>(view_, request_.settings.shadow_texel,
-                                             std::move(suns));
+// Of the angle at which light of that direction meets a plane; 1 where there is none.
+float sineOf(const Vec3& normal, const Vec3& direction) {
+    return normal == Vec3(0.0f) ? 1.0f : std::abs(glm::dot(normal, direction));
+}
+
+// The pages that a map needs, as they are found: places come in rows of the picture, so most are
+// those of the place before.
+class PageSet {
+public:
+    // x, y, width: in the map's texel units (metres, slopes).
+    void add(double x, double y, float width) {
+        // What lies a little nearer or farther may fall into the level beside.
+        const int low = levelExponent(width * 0.93f), high = levelExponent(width * 1.07f);
+        for (int e = low; e <= high; ++e) add(x, y, e);
+        add(x, y, high + kSpareLevels);
+        if (pages_.size() < most_) return;
+        sortUnique(pages_);
+        most_ = 2 * pages_.size() + kFewPages;
+    }
+    std::vector<PageKey> take() {
+        sortUnique(pages_);
+        return std::move(pages_);
     }
 
 private:
-    // Draws depths of a view into tiles that are wanted (empty: all).
-    void drawDepths(const View& view, const RenderSettings& settings,
-                    const std::function<bool(const SubpixelRect&)>& is_wanted, bool rasterizes,
-                    const TakeDepths& take) {
-        const FramePlan& plan = sampler_.plan(view, settings, pool_, request_.cancel);
-        ReconstructionContext context;
-        context.view = view;
-        context.settings = settings;
-        if (rasterizes) context.base = rasterize_(view, plan);
-        const TriangleLookup nothing = [](uint32_t, float, float, SurfaceSample&) {};
-        TileJob job;
-        job.view = view;
-        job.tile_size = settings.tile_size;
-        job.makeReconstruction = [&] { return makeDepthOnly(context, take); };
-        job.is_wanted = is_wanted;
-        job.source = &sampler_;
-        job.batches = &plan.batches;
-        job.triangle_lookup = &nothing;
-        job.phase = "shadows";
-        runTiles(job, pool_, request_, drawn_);
-    }
+    static constexpr size_t kFewPages = 16384;
 
-    Look lookAtScene() {
-        Look look;
-        look.view = view_;
-        look.view.subpixels = 1;
-        look.view.width = (view_.width + kLookPixels - 1) / kLookPixels;
-        look.view.height = (view_.height + kLookPixels - 1) / kLookPixels;
-        const double scale = 1.0 / (view_.subpixels * kLookPixels);
-        look.view.focal *= scale;
-        look.view.center_x *= scale;
-        look.view.center_y *= scale;
-        RenderSettings settings = request_.settings;
-        settings.subpixels = 1;
-        settings.samples = 1.0;
-        settings.tile_size = kPageTexels;
-        const int width = look.view.width;
-        look.depth.assign(size_t(width) * size_t(look.view.height), kInfinity);
-        const TakeDepths take = [&](const SubpixelRect& inner, const DepthTile& tile) {
-            for (int y = inner.y0; y < inner.y1; ++y) {
-                for (int x = inner.x0; x < inner.x1; ++x)
-                    look.depth[size_t(y) * size_t(width) + size_t(x)] =
-                        DepthTile::depthOf(tile.row(y)[x]);
-            }
-        };
-        drawDepths(look.view, settings, {}, true, take);
-        return look;
-    }
-
-    // Pages that hold what the look has seen, at the size of a pixel there, and spare ones.
-    std::vector<PageKey> neededPages(const DMat3& sun_from_world, const Look& look,
-                                     const ShadowPages& sizes) const {
-        const float haze = scene_.lighting.sky.haze_distance;
-        const float farthest = haze > 0.0f ? -haze * std::log(kHazeLeft) : kInfinity;
-        const DMat3 sun_from_camera = sun_from_world * glm::transpose(view_.camera_from_world);
-        const DVec3 eye = sun_from_world * view_.eye_world;
-        std::vector<PageKey> pages;
-        for (int y = 0; y < look.view.height; ++y) {
-            for (int x = 0; x < look.view.width; ++x) {
-                const float depth = look.depth[size_t(y) * size_t(look.view.width) + size_t(x)];
-                if (!(depth < kInfinity)) continue;
-                Vec3 origin, direction;
-                look.view.ray(float(x) + 0.5f, float(y) + 0.5f, origin, direction);
-                const Vec3 p_camera = origin + direction * depth;
-                if (glm::length(p_camera) > farthest) continue;
-                const DVec3 p = eye + sun_from_camera * DVec3(p_camera);
-                // What lies a little nearer or farther may fall into the level beside.
-                const float texel = sizes.wantedTexel(depth);
-                const int low = levelExponent(texel * 0.93f), high = levelExponent(texel * 1.07f);
-                for (int e = low; e <= high; ++e) addPages(pages, p, e);
-                addPages(pages, p, high + kSpareLevels);
-            }
-            sortUnique(pages);
-        }
-        return pages;
-    }
-
-    static void addPages(std::vector<PageKey>& pages, const DVec3& p, int exponent) {
+    void add(double x, double y, int exponent) {
         const double texel = std::ldexp(1.0, exponent);
         const double per_page = 1.0 / (texel * kPageTexels), margin = kPageMargin * texel;
         for (int k = 0; k < 4; ++k) {
             const PageKey key{exponent,
-                              int64_t(std::floor((p.x + (k & 1 ? margin : -margin)) * per_page)),
-                              int64_t(std::floor((p.y + (k & 2 ? margin : -margin)) * per_page))};
-            if (pages.empty() || !(pages.back() == key)) pages.push_back(key);
+                              int64_t(std::floor((x + (k & 1 ? margin : -margin)) * per_page)),
+                              int64_t(std::floor((y + (k & 2 ? margin : -margin)) * per_page))};
+            if (pages_.empty() || !(pages_.back() == key)) pages_.push_back(key);
         }
     }
 
-    SunShadow drawSun(const Sun& sun, const Look& look) {
-        SunShadow shadow;
-        const DMat3 world_from_sun =
+    std::vector<PageKey> pages_;
+    size_t most_ = kFewPages;
+};
+
+// What a light's view starts from.
+struct LightSpace {
+    DMat3 world_from_light = DMat3(1.0);
+    bool is_lamp = false;
+    DVec3 lamp = DVec3(0.0);  // its place, world
+    float far_z = kInfinity;  // of a lamp: nothing behind needs to cast shadows
+};
+
+class ShadowBuilder {
+public:
+    ShadowBuilder(const Scene& scene, const View& view, const DepthDrawer& drawer)
+        : scene_(scene),
+          view_(view),
+          drawer_(drawer),
+          settings_(drawer.request.settings),
+          sizes_(view, settings_.shadow_texel, {}, {}) {
+        const DBox3 bounds = sceneBounds(scene);
+        bounds_min_ = bounds.min;
+        bounds_max_ = bounds.max;
+        const float haze = scene.lighting.sky.haze_distance;
+        if (haze > 0.0f) farthest_ = -haze * std::log(kHazeLeft);
+    }
+
+    std::unique_ptr<ShadowPages> build(const FirstLook& look, FrameStats& stats) {
+        std::vector<ShadowMap> suns;
+        for (const Sun& sun : scene_.lighting.suns) suns.push_back(drawSun(sun, look));
+        std::vector<LampShadow> lamps;
+        for (const PointLight& lamp : scene_.lighting.points) lamps.push_back(drawLamp(lamp, look));
+        stats.shadow_points += drawn_.points_drawn;
+        return std::make_unique<ShadowPages>(view_, settings_.shadow_texel, std::move(suns),
+                                             std::move(lamps));
+    }
+
+private:
+    ShadowMap drawSun(const Sun& sun, const FirstLook& look) {
+        LightSpace space;
+        space.world_from_light =
             lookAt(DVec3(0.0), -DVec3(sun.direction_to_light)).world_from_camera;
-        shadow.sun_from_world = glm::transpose(world_from_sun);
-        const ShadowPages sizes(view_, request_.settings.shadow_texel, {});
-        std::vector<PageKey> pages = neededPages(shadow.sun_from_world, look, sizes);
+        const DMat3 sun_from_world = glm::transpose(space.world_from_light);
+        const DMat3 sun_from_camera = sun_from_world * glm::transpose(view_.camera_from_world);
+        const DVec3 eye = sun_from_world * view_.eye_world;
+        PageSet pages;
+        const Vec3 direction(glm::transpose(sun_from_camera)[2]);
+        forEachSeen(look, [&](const Vec3& p_camera, float depth, const Vec3& normal) {
+            if (glm::length(p_camera) > farthest_) return;
+            const DVec3 p = eye + sun_from_camera * DVec3(p_camera);
+            pages.add(p.x, p.y, sizes_.wantedTexel(depth, sineOf(normal, direction)));
+        });
+        return drawMap(space, pages.take());
+    }
+
+    // Only where it gives enough light to be seen.
+    LampShadow drawLamp(const PointLight& lamp, const FirstLook& look) {
+        LampShadow shadow;
+        shadow.position = lamp.position;
+        if (lamp.is_spot) {
+            shadow.lamp_from_world =
+                glm::transpose(lookAt(DVec3(0.0), DVec3(lamp.axis)).world_from_camera);
+        }
+        const DMat3 lamp_from_camera =
+            shadow.lamp_from_world * glm::transpose(view_.camera_from_world);
+        const Mat3 world_from_lamp(glm::transpose(shadow.lamp_from_world));
+        const DVec3 eye = shadow.lamp_from_world * (view_.eye_world - lamp.position);
+        const float exposure =
+            std::exp2(scene_.lighting.exposure + float(settings_.exposure)) / float(kPi);
+        std::array<PageSet, kCubeFaces> pages;
+        std::array<float, kCubeFaces> far_z{};
+        std::array<DMat3, kCubeFaces> face_from_lamp;
+        for (int f = 0; f < kCubeFaces; ++f) face_from_lamp[size_t(f)] = cubeFaceFromLamp(f);
+        const Mat3 camera_from_lamp(glm::transpose(lamp_from_camera));
+        forEachSeen(look, [&](const Vec3& p_camera, float depth, const Vec3& normal) {
+            if (glm::length(p_camera) > farthest_) return;
+            const DVec3 p_lamp = eye + lamp_from_camera * DVec3(p_camera);
+            const Vec3 light = incidentLight(lamp, world_from_lamp * Vec3(-p_lamp));
+            if (std::max({light.x, light.y, light.z}) * exposure < kLeastLight) return;
+            const size_t face = size_t(cubeFaceOf(Vec3(p_lamp)));
+            const DVec3 p = face_from_lamp[face] * p_lamp;
+            const float sine = sineOf(normal, camera_from_lamp * Vec3(glm::normalize(p_lamp)));
+            pages[face].add(p.x / p.z, p.y / p.z, sizes_.wantedTexel(depth, sine) / float(p.z));
+            far_z[face] = std::max(far_z[face], float(p.z));
+        });
+        for (size_t f = 0; f < kCubeFaces; ++f) {
+            LightSpace space;
+            space.is_lamp = true;
+            space.lamp = lamp.position;
+            space.world_from_light = glm::transpose(face_from_lamp[f] * shadow.lamp_from_world);
+            space.far_z = far_z[f] * kBehindSeen;
+            shadow.faces[f] = drawMap(space, pages[f].take());
+        }
+        return shadow;
+    }
+
+    ShadowMap drawMap(const LightSpace& space, std::vector<PageKey> pages) {
+        ShadowMap shadow;
+        shadow.light_from_world = glm::transpose(space.world_from_light);
         if (pages.empty()) return shadow;
         shadow.first_exponent = pages.front().exponent;
         for (int exponent = shadow.first_exponent; !pages.empty(); ++exponent) {
@@ -178,7 +232,8 @@ private:
             pages.erase(pages.begin(), end);
             ShadowLevel level;
             level.texel = float(std::ldexp(1.0, exponent));
-            if (!own.empty() && !drawLevel(own, world_from_sun, level)) {
+            if (space.is_lamp) level.origin = shadow.light_from_world * space.lamp;
+            if (!own.empty() && !drawLevel(own, space, level)) {
                 for (const PageKey& key : own)
                     pages.push_back({exponent + 1, key.x >> 1, key.y >> 1});
                 sortUnique(pages);
@@ -189,8 +244,7 @@ private:
     }
 
     // False if the pages lie too far apart.
-    bool drawLevel(const std::vector<PageKey>& pages, const DMat3& world_from_sun,
-                   ShadowLevel& level) {
+    bool drawLevel(const std::vector<PageKey>& pages, const LightSpace& space, ShadowLevel& level) {
         int64_t x0 = pages[0].x, x1 = x0, y0 = pages[0].y, y1 = y0;
         for (const PageKey& key : pages) {
             x0 = std::min(x0, key.x), x1 = std::max(x1, key.x);
@@ -206,22 +260,38 @@ private:
         }
         level.depth.assign(pages.size() * kPageTexels * kPageTexels, kInfinity);
 
-        const double page = double(level.texel) * kPageTexels;
-        double z_min, z_max;
-        const DVec3 corner(double(x0) * page, double(y0) * page, 0.0);
-        depthRange(world_from_sun, corner, level.columns * page, level.rows * page, z_min, z_max);
-        if (!(z_min <= z_max)) return true;  // nothing there
-        level.origin = DVec3(corner.x, corner.y, z_min - 1.0);
         View view;
         view.width = level.columns * kPageTexels;
         view.height = level.rows * kPageTexels;
-        view.orthographic = true;
-        view.eye_world = world_from_sun * level.origin;
-        view.camera_from_world = glm::transpose(world_from_sun);
+        view.camera_from_world = glm::transpose(space.world_from_light);
         view.focal = 1.0 / double(level.texel);
-        view.near_z = 0.5f;
-        view.far_z = float(z_max - z_min + 2.0);
-        RenderSettings settings = request_.settings;
+        if (space.is_lamp) {
+            level.corner_x = double(x0) * kPageTexels;
+            level.corner_y = double(y0) * kPageTexels;
+            view.eye_world = space.lamp;
+            view.center_x = -level.corner_x;
+            view.center_y = -level.corner_y;
+            view.near_z = kLampClearance;
+            view.far_z = space.far_z;
+        } else {
+            const double page = double(level.texel) * kPageTexels;
+            double z_min, z_max;
+            const DVec3 corner(double(x0) * page, double(y0) * page, 0.0);
+            depthRange(space.world_from_light, corner, level.columns * page, level.rows * page,
+                       z_min, z_max);
+            if (!(z_min <= z_max)) return true;  // nothing there
+            level.origin = DVec3(corner.x, corner.y, z_min - 1.0);
+            view.orthographic = true;
+            view.eye_world = space.world_from_light * level.origin;
+            view.near_z = 0.5f;
+            view.far_z = float(z_max - z_min + 2.0);
+        }
+        drawPages(view, level);
+        return true;
+    }
+
+    void drawPages(const View& view, ShadowLevel& level) {
+        RenderSettings settings = settings_;
         settings.subpixels = 1;
         settings.samples = 1.0;
         settings.tile_size = kPageTexels;
@@ -239,10 +309,9 @@ private:
                     *out++ = DepthTile::depthOf(tile.row(y)[x]);
             }
         };
-        drawDepths(
+        drawer_.draw(
             view, settings, [&](const SubpixelRect& inner) { return slotOf(inner) >= 0; }, false,
-            take);
-        return true;
+            take, drawn_);
     }
 
     // Depths, from the sun, at which the column over a rectangle of sun space meets the scene's
@@ -269,23 +338,21 @@ private:
 
     const Scene& scene_;
     const View& view_;
-    RandomizedSampler& sampler_;
-    const RasterizeLarge& rasterize_;
-    ThreadPool& pool_;
-    const FrameRequest& request_;
+    const DepthDrawer& drawer_;
+    const RenderSettings& settings_;
+    const ShadowPages sizes_;  // empty: for the sizes it asks for
     DVec3 bounds_min_, bounds_max_;
+    float farthest_ = kInfinity;  // from the eye, metres: behind that haze hides everything
     FrameStats drawn_;
 };
 
 }  // namespace
 
 std::unique_ptr<ShadowPages> makeShadowMaps(const Scene& scene, const View& view,
-                                            RandomizedSampler& sampler,
-                                            const RasterizeLarge& rasterize, ThreadPool& pool,
-                                            const FrameRequest& request, FrameStats& stats) {
+                                            const FirstLook& look, const DepthDrawer& drawer,
+                                            FrameStats& stats) {
     const Stopwatch watch;
-    std::unique_ptr<ShadowPages> maps =
-        ShadowBuilder(scene, view, sampler, rasterize, pool, request).build(stats);
+    std::unique_ptr<ShadowPages> maps = ShadowBuilder(scene, view, drawer).build(look, stats);
     stats.shadow_bytes = maps->bytes();
     stats.phases.emplace_back("shadows", watch.seconds());
     return maps;

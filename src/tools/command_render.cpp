@@ -195,8 +195,6 @@ RenderSettings effectiveSettings(const RenderOptions& options, const Scene& scen
     for (const auto& [key, value] : scene.render_defaults)
         applySetting(settings, key, value, scene.path);
     options.settings.apply(settings);
-    // Better refused than ignored.
-    if (settings.ao) throw Error(ErrorCode::kInvalidArgument, "--ao", "is not yet available");
     return settings;
 }
 

@@ -85,7 +85,7 @@ std::string statsJson(const RunStats& stats) {
         {"points_drawn", frame.points_drawn},       {"points_kept", frame.points_kept},
         {"points_culled", frame.points_culled},     {"batches", frame.batches},
         {"large_triangles", frame.large_triangles}, {"overestimation", frame.overestimation},
-        {"shadow_points", frame.shadow_points}};
+        {"shadow_points", frame.shadow_points},     {"look_points", frame.look_points}};
     json["memory"] = {{"peak_bytes", peakMemoryBytes()},
                       {"cache_bytes", frame.cache_bytes},
                       {"shadow_bytes", frame.shadow_bytes}};

@@ -105,8 +105,6 @@ case_bad_setting() {
     expect_error 2 '--samples' render a.glb -o a.png --samples nan
     expect_error 2 '--threads' render a.glb -o a.png --threads -1
     expect_error 2 '--seed' render a.glb -o a.png --seed 1.5
-    write_scene
-    expect_error 2 'not yet available' render scene.scene.json -o a.png --ao on
 }
 
 case_aov_with_png() {

@@ -1,20 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Panes of glass, a ball of mist and masked leaves against many rays that pass each layer by
 // chance.
+#include "test_scene.h"
+
 #include <gtest/gtest.h>
 #include <render/compare.h>
-#include <render/renderer.h>
-#include <scenegraph/procedural/generators.h>
 
 namespace stipple {
 namespace {
-
-uint32_t addMesh(Scene& scene, GeneratedMesh made) {
-    for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(m + scene.materials.size());
-    scene.materials.insert(scene.materials.end(), made.materials.begin(), made.materials.end());
-    scene.meshes.push_back(std::move(made.mesh));
-    return uint32_t(scene.meshes.size() - 1);
-}
 
 // Four panes behind each other, one of them in fine triangles, a glass ball, a tree and mist before
 // a floor and boxes.

@@ -3,24 +3,12 @@
 // or without caches.
 #include <gtest/gtest.h>
 #include <render/compare.h>
-#include <render/renderer.h>
-#include <scenegraph/procedural/generators.h>
+#include <tests/image/test_scene.h>
 
 #include <array>
 
 namespace stipple {
 namespace {
-
-constexpr Reconstruct kReconstructions[] = {Reconstruct::kPerPixel, Reconstruct::kSplat,
-                                            Reconstruct::kGaussian, Reconstruct::kPullPush,
-                                            Reconstruct::kEwa,      Reconstruct::kBins};
-
-uint32_t addMesh(Scene& scene, GeneratedMesh made) {
-    for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(m + scene.materials.size());
-    scene.materials.insert(scene.materials.end(), made.materials.begin(), made.materials.end());
-    scene.meshes.push_back(std::move(made.mesh));
-    return uint32_t(scene.meshes.size() - 1);
-}
 
 // A floor, a fine sphere and a few hundred trees in a nested group, at `place`.
 Scene testScene(const DVec3& place, int floor_triangles = 2) {

@@ -3,51 +3,22 @@
 // in the light; the same bits for any number of threads.
 #include <gtest/gtest.h>
 #include <render/compare.h>
-#include <render/renderer.h>
-#include <scenegraph/procedural/generators.h>
+#include <tests/image/test_scene.h>
 
 namespace stipple {
 namespace {
 
 constexpr int kWidth = 320, kHeight = 200;
 
-uint32_t addMesh(Scene& scene, GeneratedMesh made) {
-    for (uint16_t& m : made.mesh.triangle_material) m = uint16_t(m + scene.materials.size());
-    scene.materials.insert(scene.materials.end(), made.materials.begin(), made.materials.end());
-    scene.meshes.push_back(std::move(made.mesh));
-    return uint32_t(scene.meshes.size() - 1);
-}
-
-Affine placed(const DVec3& at, const DVec3& size, double turn = 0.0) {
-    Affine a;
-    a.linear =
-        DMat3(std::cos(turn), 0, -std::sin(turn), 0, 1, 0, std::sin(turn), 0, std::cos(turn));
-    for (int i = 0; i < 3; ++i) a.linear[i] *= size[i];
-    a.translation = at;
-    return a;
-}
-
 // A plane, and what stands on it.
-struct TestScene {
-    Scene scene;
-    Group root;
-
-    explicit TestScene(const Vec3& to_sun) {
-        scene.path = "test";
+struct ShadowScene : TestScene {
+    explicit ShadowScene(const Vec3& to_sun) : ShadowScene() {
         scene.lighting.suns.push_back({glm::normalize(to_sun), Vec3(3.0f)});
-        root.instances = InstanceStore(DBox3{DVec3(-500), DVec3(500)});
-        add(makePrimitive("plane", 2, Vec3(0.5f)), placed(DVec3(0.0), DVec3(400.0)));
     }
-    void add(GeneratedMesh mesh, const Affine& at) {
-        root.instances.add(ChildRef::mesh(addMesh(scene, std::move(mesh))), at);
+    explicit ShadowScene(const PointLight& lamp) : ShadowScene() {
+        scene.lighting.points.push_back(lamp);
     }
-    Scene& build() {
-        scene.root = uint32_t(scene.groups.size());
-        scene.groups.push_back(root);
-        ThreadPool pool(2);
-        buildScene(scene, pool);
-        return scene;
-    }
+    ShadowScene() { add(makePrimitive("plane", 2, Vec3(0.5f)), placed(DVec3(0.0), DVec3(400.0))); }
 };
 
 FrameRequest request(const DVec3& eye = DVec3(3, 4, 9)) {
@@ -78,14 +49,9 @@ bool isEven(const Image& image, int x, int y, int radius, float tolerance) {
     return high - low <= tolerance * high;
 }
 
-class ShadowOfBox : public testing::TestWithParam<float> {};
-
 // An edge farther off than 1.5 pixels would show in a pixel whose neighbours, two pixels around,
 // are all lit or all in the shade; so would light under the box, or false shadow on the plane.
-TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
-    TestScene t(Vec3(-1.0f, GetParam(), 0.3f));
-    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), DVec3(3.0), 0.5));
-    const Scene& scene = t.build();
+void expectShadowsOfRays(const Scene& scene, int least_lit, int least_shaded) {
     const Image rays = render(scene, request(), Method::kRaycast, true);
     const Image open = render(scene, request(), Method::kRaycast, false);
     for (const Method method : {Method::kPoints, Method::kZBuffer}) {
@@ -99,18 +65,68 @@ TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
                 wrong += std::abs(maps.pixel(x, y)[1] - expected) > 0.03f * expected;
             }
         }
-        EXPECT_GT(lit, 20000);
-        EXPECT_GT(shaded, 400);
+        EXPECT_GT(lit, least_lit);
+        EXPECT_GT(shaded, least_shaded);
         EXPECT_EQ(wrong, 0);
+        ThreadPool pool(2);
+        EXPECT_GT(compareImages(maps, rays, pool).psnr, 28.0);
+    }
+}
+
+class ShadowOfBox : public testing::TestWithParam<float> {};
+
+TEST_P(ShadowOfBox, liesWhereRaysHaveIt) {
+    ShadowScene t(Vec3(-1.0f, GetParam(), 0.3f));
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 1.5, 0), DVec3(3.0), 0.5));
+    expectShadowsOfRays(t.build(), 20000, 400);
+}
+
+// The shadow's far edge: there a texel of the sun's width would cover four pixels of the plane.
+TEST(Shadows, ofASlabUnderALowSunLiesWhereRaysHaveIt) {
+    for (const double height : {0.15, 0.3, 0.5}) {
+        ShadowScene t(Vec3(-1.0f, 0.25f, 0.3f));
+        t.add(makePrimitive("box", 12, Vec3(0.6f)),
+              placed(DVec3(0, 0.5 * height, 0), DVec3(3.0, height, 3.0)));
+        expectShadowsOfRays(t.build(), 20000, 20);
     }
 }
 
 INSTANTIATE_TEST_SUITE_P(heights, ShadowOfBox, testing::Values(2.0f, 0.7f, 0.25f));
 
+PointLight spotAt(const DVec3& place, const DVec3& target) {
+    PointLight lamp;
+    lamp.position = place;
+    lamp.intensity = Vec3(120.0f);
+    lamp.is_spot = true;
+    lamp.axis = glm::normalize(Vec3(target - place));
+    lamp.inner_cone = 0.5f;
+    return lamp;
+}
+
+PointLight lampAt(const DVec3& place) {
+    PointLight lamp;
+    lamp.position = place;
+    lamp.intensity = Vec3(60.0f);
+    return lamp;
+}
+
+class ShadowOfLamp : public testing::TestWithParam<PointLight> {};
+
+// The plane begins behind the lamp where it shines aside.
+TEST_P(ShadowOfLamp, liesWhereRaysHaveIt) {
+    ShadowScene t(GetParam());
+    t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 0.75, 0), DVec3(1.5), 0.5));
+    expectShadowsOfRays(t.build(), 10000, 400);
+}
+
+INSTANTIATE_TEST_SUITE_P(lamps, ShadowOfLamp,
+                         testing::Values(spotAt(DVec3(-4, 4, 1), DVec3(0, 0.5, 0)),
+                                         lampAt(DVec3(-3, 4, 1)), lampAt(DVec3(-2.2, 1.2, 0.9))));
+
 // A ball's lit side has no shadow of its own, and its far side no light, but for the pixels where
 // the light grazes it.
 TEST(Shadows, curvedSurfacesHaveNoAcne) {
-    TestScene t(Vec3(-1.0f, 0.8f, 0.6f));
+    ShadowScene t(Vec3(-1.0f, 0.8f, 0.6f));
     t.add(makePrimitive("sphere", 80000, Vec3(0.6f)), placed(DVec3(0, 1.2, 0), DVec3(2.4)));
     const Scene& scene = t.build();
     FrameRequest r = request();
@@ -134,7 +150,7 @@ TEST(Shadows, curvedSurfacesHaveNoAcne) {
 }
 
 TEST(Shadows, whatStandsBehindTheCameraShadesWhatItSees) {
-    TestScene t(Vec3(0.0f, 0.5f, 1.0f));  // from behind the camera
+    ShadowScene t(Vec3(0.0f, 0.5f, 1.0f));  // from behind the camera
     t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 40, 60), DVec3(200, 80, 2)));
     const Scene& scene = t.build();
     const Image rays = render(scene, request(), Method::kRaycast, true);
@@ -147,7 +163,7 @@ TEST(Shadows, whatStandsBehindTheCameraShadesWhatItSees) {
 
 // Trees in a group that is placed twice, or the same trees in one flat group.
 Scene wood(bool is_nested) {
-    TestScene t(Vec3(-1.0f, 0.9f, 0.4f));
+    ShadowScene t(Vec3(-1.0f, 0.9f, 0.4f));
     TreeParams params;
     params.triangles = 4000;
     const uint32_t tree = addMesh(t.scene, makeTree(params));
@@ -200,8 +216,36 @@ TEST(Shadows, treesAreAsBrightAsByRays) {
     EXPECT_GT(without.mean, 0.05);  // there is something to see
 }
 
+// One shines from within the trees to all sides, one from above.
+Scene woodByNight() {
+    Scene scene = wood(true);
+    scene.lighting.suns.clear();
+    scene.lighting.sky.zenith = scene.lighting.sky.horizon = Vec3(0.02f);
+    PointLight within = lampAt(DVec3(-36.0, 5.0, 4.0)),
+               above = spotAt(DVec3(60, 50, 20), DVec3(30, 0, -20));
+    within.intensity = Vec3(1500.0f);
+    above.intensity = Vec3(20000.0f);
+    scene.lighting.points = {within, above};
+    return scene;
+}
+
+TEST(Shadows, treesUnderLampsAreAsBrightAsByRays) {
+    const Scene scene = woodByNight();
+    const Image rays = render(scene, woodRequest(), Method::kRaycast, true);
+    const Image maps = render(scene, woodRequest(), Method::kPoints, true);
+    ThreadPool pool(2);
+    const TileMeans means = tileMeans(maps, rays);
+    EXPECT_NEAR(means.mean, 0.0, 0.02);
+    EXPECT_LT(means.rms, 0.05);
+    EXPECT_GT(compareImages(maps, rays, pool).psnr, 28.0);
+    const TileMeans without =
+        tileMeans(render(scene, woodRequest(), Method::kRaycast, false), rays);
+    EXPECT_GT(without.mean, 0.05);
+}
+
 TEST(Shadows, sameBitsForAnyNumberOfThreads) {
-    const Scene scene = wood(true);
+    Scene scene = wood(true);
+    scene.lighting.points = woodByNight().lighting.points;
     for (const Method method : {Method::kPoints, Method::kRaycast}) {
         const Image one = render(scene, woodRequest(), method, true, 1);
         EXPECT_EQ(one.data, render(scene, woodRequest(), method, true, 3).data);
@@ -210,7 +254,7 @@ TEST(Shadows, sameBitsForAnyNumberOfThreads) {
 
 // Texels lie still in the world: where the camera goes aside by whole pixels, so does the picture.
 TEST(Shadows, doNotSwimWhenTheCameraMoves) {
-    TestScene t(Vec3(-1.0f, 0.7f, 0.3f));
+    ShadowScene t(Vec3(-1.0f, 0.7f, 0.3f));
     TreeParams params;
     params.triangles = 4000;
     params.height = 6.0;
@@ -238,7 +282,7 @@ TEST(Shadows, doNotSwimWhenTheCameraMoves) {
 }
 
 TEST(Shadows, everyReconstructionTakesThem) {
-    TestScene t(Vec3(-1.0f, 0.7f, 0.3f));
+    ShadowScene t(Vec3(-1.0f, 0.7f, 0.3f));
     t.add(makePrimitive("box", 12, Vec3(0.6f)), placed(DVec3(0, 0.75, 0), DVec3(1.5), 0.5));
     const Scene& scene = t.build();
     const Image rays = render(scene, request(), Method::kRaycast, true);
