@@ -16,6 +16,8 @@
 namespace stipple {
 
 inline constexpr int kBlockSurfels = 64;  // most of a block
+// Discs are squares; on a mesh of points whose sides are a spacing, this many spacings close it.
+inline constexpr float kDiscSide = 1.25f;
 
 // Up to 64 surfels that lie near each other and face about the same way.
 struct SurfelBlock {
@@ -72,6 +74,10 @@ struct SurfelModel {
     std::vector<SurfelFinish> finishes;  // at most 256
     std::vector<SurfelLevel> levels;     // finest first, each about twice the spacing of the last
 
+    // Whether no more points than the spacing asks for leave no holes; else they close them by
+    // their patches' widths.
+    bool leaves_no_holes = true;
+
     size_t bytes() const;
 };
 
@@ -97,7 +103,11 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
                         float spacing, bool with_radii);
 Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t index);
 
-// Throws kParse (where: names the file) unless blocks, counts, numbers and finishes make sense.
+// Throw kParse (where: names the file) unless blocks, counts, numbers and finishes make sense.
 void checkSurfelModel(const SurfelModel& model, const std::string& where);
+void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes,
+                       const std::string& where);
+void checkSurfelFinishes(const std::vector<SurfelFinish>& finishes, const std::string& where);
+void checkMaterialNumbers(const Material& material, const std::string& where);
 
 }  // namespace stipple

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Splits a mesh's triangles into connected clusters, flat ones first. Based on: Garland, Willmott,
+// Heckbert. Hierarchical Face Clustering on Polygonal Surfaces. 2001; Ni. Hybrid Triangle/Point
+// Models. 2005 (two phases).
+#pragma once
+
+#include <core/parallel.h>
+#include <scenegraph/mesh.h>
+
+#include <vector>
+
+namespace stipple {
+
+struct ClusterOptions {
+    // Costs have no unit: how far a cluster is from a plane (in a box of side 1), how much its
+    // normals turn, and how much less compact it is than its parts (negative if it is more so).
+    double phase_one = 0.2;   // flat clusters grow up to this cost
+    double phase_two = 0.1;   // small ones are joined, flat or not, up to this cost
+    int clusters = 0;         // in place of the costs: this many after phase one, 0: by cost
+    double flat_share = 0.0;  // phase two ends when no more of the triangles are in flat clusters
+    uint32_t largest = 1000;  // triangles in a cluster
+};
+
+struct FaceClusters {
+    std::vector<uint32_t> cluster_of;  // one a triangle
+    std::vector<uint8_t> is_flat;      // one a cluster: made in phase one and left alone in two
+    std::vector<Vec3> normal;          // one a cluster: of the plane that fits best, unit
+    uint32_t after_phase_one = 0;      // clusters there were
+};
+
+// Clusters are numbered in the order of their first triangles. Triangles are joined across edges
+// that two of them share, by position, if they have the same material. Vertices: positions and
+// triangles of the mesh alone are looked at, and need not be built. A higher cost never gives more
+// clusters, and each is a union of those of a lower one. Throws kCancelled. O(n log n).
+FaceClusters clusterFaces(const Mesh& mesh, const ClusterOptions& options,
+                          const CancelFlag& cancel);
+
+}  // namespace stipple
