@@ -75,7 +75,7 @@ private:
             addBatch(p, box, std::min(mesh.surfels->area * box.bound * area_scale, 1e9));
             return;
         }
-        if (drawsPatches(mesh, box) && !rasterize_all_) {
+        if (drawsPatches(mesh, box, settings_) && !rasterize_all_) {
             visitPatches(p, mesh, area_scale);
             return;
         }

@@ -9,8 +9,8 @@ namespace stipple {
 
 namespace {
 
-// Smaller ones, in subpixels, are a few points on what is seen of them.
-constexpr float kSmallModel = 96.0f;
+// A patch's coarsest surfels are worth about so many subpixels of the model's square.
+constexpr float kSubpixelsPerPatch = 32.0f;
 constexpr float kMostError = 0.5f;  // subpixels
 // Of coarser triangles none may be left to the z-buffer, which knows only the finest.
 constexpr double kBelowLarge = 0.9;
@@ -21,8 +21,9 @@ constexpr double kSurfelCost = 6.0, kPointCost = 25.0, kTriangleCost = 60.0, kSu
 
 }  // namespace
 
-bool drawsPatches(const Mesh& mesh, const BoxProjection& box) {
-    return !mesh.patches.empty() && box.size > kSmallModel;
+bool drawsPatches(const Mesh& mesh, const BoxProjection& box, const RenderSettings& settings) {
+    return !mesh.patches.empty() && box.size > float(settings.visible_size) &&
+           box.size * box.size > kSubpixelsPerPatch * float(mesh.patches.size());
 }
 
 uint32_t choosePatch(const Scene& scene, const MeshPatch& patch, const BoxProjection& box,

@@ -150,7 +150,7 @@ void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& c
                        uint64_t path, const BoxProjection& box) {
     const Mesh& mesh = context_.scene.meshes[mesh_index];
     if (mesh.triangles.empty() && !mesh.surfels) return;
-    if (node_index == 0 && drawsPatches(mesh, box)) {
+    if (node_index == 0 && drawsPatches(mesh, box, context_.settings)) {
         drawPatches(mesh, camera_from_object, path);
         return;
     }

@@ -13,7 +13,7 @@ namespace stipple {
 
 namespace {
 
-constexpr double kFitWeight = 100.0;  // a tenth of the box off the plane costs 1
+constexpr double kFitWeight = 200.0;   // of the mean squared distance over the area
 constexpr double kSizeWeight = 0.25;  // phase two: for a cluster of the largest size
 constexpr uint32_t kNone = 0xffffffffu;
 
@@ -114,20 +114,14 @@ public:
     FaceClusters run() {
         FaceClusters result;
         mergeAll(true);
-        result.after_phase_one = left_;
+        result.first_of = number([&](uint32_t root) {
+            double fit;
+            result.first_normal.push_back(Vec3(planeOf(sums_[root], fit)));
+        });
         flat_triangles_ = sums_.size();
         mergeAll(false);
-        std::vector<uint32_t> number(sums_.size(), kNone);
-        for (uint32_t t = 0; t < sums_.size(); ++t) {
-            const uint32_t root = find(t);
-            if (number[root] == kNone) {
-                number[root] = uint32_t(result.is_flat.size());
-                result.is_flat.push_back(is_flat_[root]);
-                double fit;
-                result.normal.push_back(Vec3(planeOf(sums_[root], fit)));
-            }
-            result.cluster_of.push_back(number[root]);
-        }
+        result.cluster_of =
+            number([&](uint32_t root) { result.is_flat.push_back(is_flat_[root]); });
         return result;
     }
 
@@ -145,6 +139,19 @@ private:
             return a != o.a ? a > o.a : b > o.b;
         }
     };
+
+    // The cluster of each triangle, in the order of their first; each: called once a cluster.
+    template <class Each>
+    std::vector<uint32_t> number(const Each& each) {
+        std::vector<uint32_t> of_root(sums_.size(), kNone), result;
+        uint32_t next = 0;
+        for (uint32_t t = 0; t < sums_.size(); ++t) {
+            const uint32_t root = find(t);
+            if (of_root[root] == kNone) of_root[root] = next++, each(root);
+            result.push_back(of_root[root]);
+        }
+        return result;
+    }
 
     uint32_t find(uint32_t t) {
         while (parent_[t] != t) t = parent_[t] = parent_[parent_[t]];
@@ -177,7 +184,7 @@ private:
         }
         double fit;
         const DVec3 n = planeOf(s, fit);
-        return kFitWeight * fit + turnOf(s, n) + shape;
+        return kFitWeight * fit / std::max(s.area, 1e-30) + turnOf(s, n) + shape;
     }
 
     void push(uint32_t a, const Neighbour& n, bool is_first) {

@@ -12,8 +12,8 @@
 namespace stipple {
 
 struct ClusterOptions {
-    // Costs have no unit: how far a cluster is from a plane (in a box of side 1), how much its
-    // normals turn, and how much less compact it is than its parts (negative if it is more so).
+    // Costs have no unit: how far a cluster is from a plane for its size, how much its normals
+    // turn, and how much less compact it is than its parts (negative if it is more so).
     double phase_one = 0.2;   // flat clusters grow up to this cost
     double phase_two = 0.1;   // small ones are joined, flat or not, up to this cost
     int clusters = 0;         // in place of the costs: this many after phase one, 0: by cost
@@ -24,8 +24,9 @@ struct ClusterOptions {
 struct FaceClusters {
     std::vector<uint32_t> cluster_of;  // one a triangle
     std::vector<uint8_t> is_flat;      // one a cluster: made in phase one and left alone in two
-    std::vector<Vec3> normal;          // one a cluster: of the plane that fits best, unit
-    uint32_t after_phase_one = 0;      // clusters there were
+    // The clusters of phase one, of which those above are unions.
+    std::vector<uint32_t> first_of;  // one a triangle
+    std::vector<Vec3> first_normal;  // one a cluster: of the plane that fits best, unit
 };
 
 // Clusters are numbered in the order of their first triangles. Triangles are joined across edges

@@ -12,7 +12,6 @@
 #include <scenegraph/surfel_finish.h>
 
 #include <algorithm>
-#include <atomic>
 #include <map>
 
 namespace stipple {
@@ -56,10 +55,10 @@ void applyOption(HybridOptions& options, const std::string& key, const std::stri
 namespace {
 
 constexpr size_t kPatchTriangles = 256;                           // smaller clusters share a patch
-constexpr size_t kFewSurfels = 48;                                // levels end there
+constexpr size_t kFewSurfels = 16;                                // levels end there
 constexpr double kFinest = 1.0 / 8192.0, kCoarsest = 1.0 / 64.0;  // spacings, of the diagonal
 // No place between the grid's is farther from a surfel than a disc of this many steps reaches.
-constexpr float kSpacingPerStep = 1.2f;
+constexpr float kSpacingPerStep = 1.3f;
 constexpr double kMostSamples = double(1 << 27);
 
 // What a model is made of.
@@ -219,12 +218,39 @@ private:
                                 kCoarsest * diagonal_));
     }
 
-    void requireFewSamples(const std::vector<float>& spacing) const {
+    std::vector<DMat3> rayDirections() const {
+        std::vector<DMat3> rays;
+        for (const Vec3& normal : clusters_.first_normal) rays.push_back(raysFromObject(normal));
+        return rays;
+    }
+
+    // A piece: what one of the three grids samples of a flat cluster within a patch.
+    SampledPieces makePieces(const std::vector<DMat3>& rays) const {
+        SampledPieces pieces;
+        pieces.piece_of.resize(source_.mesh.triangles.size());
+        std::map<uint64_t, uint32_t> piece_at;
+        for (uint32_t p = 0; p < patches_.size(); ++p) {
+            pieces.spacing.push_back(spacingOf(patches_[p]));
+            for (const uint32_t c : patches_[p].clusters) {
+                for (const uint32_t t : triangles_of_[c]) {
+                    const uint64_t first = clusters_.first_of[t];
+                    const uint64_t axis = uint64_t(rayAxis(source_.mesh, t, rays[first]));
+                    const auto [at, is_new] =
+                        piece_at.emplace(first * 3 + axis, uint32_t(pieces.patch_of.size()));
+                    if (is_new) pieces.patch_of.push_back(p);
+                    pieces.piece_of[t] = at->second;
+                }
+            }
+        }
+        return pieces;
+    }
+
+    void requireFewSamples(const SampledPieces& pieces) const {
         double samples = 0.0;
         for (size_t t = 0; t < source_.mesh.triangles.size(); ++t) {
             const UVec3& v = source_.mesh.triangles[t];
             const DVec3 p(source_.mesh.positions[v.x]);
-            const double h = double(spacing[clusters_.cluster_of[t]]);
+            const double h = double(pieces.spacing[pieces.patch_of[pieces.piece_of[t]]]);
             samples += 0.5 *
                        glm::length(glm::cross(DVec3(source_.mesh.positions[v.y]) - p,
                                               DVec3(source_.mesh.positions[v.z]) - p)) /
@@ -236,27 +262,23 @@ private:
     }
 
     void sample(HybridModel& model) {
-        std::vector<float> of_patch, of_cluster(triangles_of_.size(), 0.0f);
-        for (const Patch& patch : patches_) {
-            of_patch.push_back(spacingOf(patch));
-            for (const uint32_t c : patch.clusters) of_cluster[c] = of_patch.back();
-        }
-        requireFewSamples(of_cluster);
         const SampledSurface surface = {source_.mesh, source_.materials, source_.textures};
-        std::vector<std::vector<SurfelSample>> borders =
-            sampleBorders(surface, clusters_, of_cluster);
-        std::vector<std::vector<SurfelSample>> samples(patches_.size());
-        std::atomic<size_t> done = 0;
+        const std::vector<DMat3> rays = rayDirections();
+        const SampledPieces pieces = makePieces(rays);
+        requireFewSamples(pieces);
+        std::vector<std::vector<SurfelSample>> samples = sampleBorders(surface, pieces);
         pool_.forEach(patches_.size(), [&](size_t p, int) {
             throwIfAsked();
-            if (options_.keep == PatchKind::kByFlatness && patches_[p].is_flat) return;
-            for (const uint32_t c : patches_[p].clusters) {
-                samples[p].insert(samples[p].end(), borders[c].begin(), borders[c].end());
-                sampleFaces(surface, triangles_of_[c], clusters_.normal[c], of_patch[p],
-                            samples[p]);
+            if (options_.keep == PatchKind::kByFlatness && patches_[p].is_flat) {
+                samples[p].clear();
+                return;
             }
-            dropDoubles(samples[p], of_patch[p]);
-            ++done;
+            for (const uint32_t c : patches_[p].clusters) {
+                for (const uint32_t t : triangles_of_[c])
+                    sampleFace(surface, t, rays[clusters_.first_of[t]], pieces.spacing[p],
+                               samples[p]);
+            }
+            thinToLevels(samples[p], pieces.spacing[p], kFewSurfels);
         });
         std::map<uint32_t, uint8_t> index_of;
         for (const auto& list : samples) {
@@ -265,7 +287,8 @@ private:
         model.finishes = makeFinishes(source_.materials, source_.patch_width, index_of);
         pool_.forEach(patches_.size(), [&](size_t p, int) {
             throwIfAsked();
-            packLevels(samples[p], index_of, model.finishes, of_patch[p], model.patches[p].surfels);
+            packLevels(samples[p], index_of, model.finishes, pieces.spacing[p],
+                       model.patches[p].surfels);
         });
     }
 
@@ -280,9 +303,7 @@ private:
                 surfels.push_back(s.surfel);
                 surfels.back().finish = index_of.at(s.finish_key);
             }
-            if (surfels.empty() || (l > 0 && surfels.size() < kFewSurfels)) return;
-            // What a level does not make sparser, another would not either.
-            if (l > 0 && surfels.size() > levels.back().size() * 9 / 10) return;
+            if (surfels.empty()) return;
             levels.push_back(packSurfels(std::move(surfels), finishes,
                                          kSpacingPerStep * spacing * std::exp2(0.5f * float(l)),
                                          false));
@@ -339,7 +360,7 @@ private:
 
     void fillReport(const HybridModel& model, HybridReport& report) const {
         report.triangles = model.triangles.size();
-        report.clusters_phase_one = clusters_.after_phase_one;
+        report.clusters_phase_one = uint32_t(clusters_.first_normal.size());
         report.clusters = uint32_t(clusters_.is_flat.size());
         report.patches = uint32_t(model.patches.size());
         for (uint32_t c = 0; c < report.clusters; ++c) {

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <map>
 #include <tuple>
+#include <unordered_map>
 #include <unordered_set>
 
 namespace stipple {
@@ -58,65 +59,78 @@ uint8_t lineLevels(uint32_t k, double length_in_spacings) {
 
 }  // namespace
 
-void sampleFaces(const SampledSurface& surface, const std::vector<uint32_t>& triangles,
-                 const Vec3& normal, float spacing, std::vector<SurfelSample>& out) {
-    if (triangles.empty()) return;
-    const Mesh& mesh = surface.mesh;
+DMat3 raysFromObject(const Vec3& normal) {
     const Vec3 other = std::abs(normal.x) < 0.7f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
-    const DVec3 x = glm::normalize(glm::cross(DVec3(normal), DVec3(other))),
-                y = glm::cross(DVec3(normal), x);
-    const DMat3 grid_from_object = glm::transpose(DMat3(x, y, DVec3(normal))) / double(spacing);
+    const DVec3 x = glm::normalize(glm::cross(DVec3(normal), DVec3(other)));
+    return glm::transpose(DMat3(x, glm::cross(DVec3(normal), x), DVec3(normal)));
+}
+
+namespace {
+
+int largestAxis(const DVec3& v) {
+    const DVec3 n = glm::abs(v);
+    return n.z >= n.x && n.z >= n.y ? 2 : n.y >= n.x ? 1 : 0;
+}
+
+}  // namespace
+
+int rayAxis(const Mesh& mesh, uint32_t triangle, const DMat3& rays_from_object) {
+    const UVec3& t = mesh.triangles[triangle];
+    const DVec3 p(mesh.positions[t.x]);
+    return largestAxis(rays_from_object *
+                       glm::cross(DVec3(mesh.positions[t.y]) - p, DVec3(mesh.positions[t.z]) - p));
+}
+
+void sampleFace(const SampledSurface& surface, uint32_t t, const DMat3& rays_from_object,
+                float spacing, std::vector<SurfelSample>& out) {
+    const Mesh& mesh = surface.mesh;
     // Off the vertices of models that are made of whole numbers.
     const DVec3 off(0.371, 0.437, 0.413);
-    const DVec3 origin(mesh.positions[mesh.triangles[triangles[0]].x]);
-    for (const uint32_t t : triangles) {
-        DVec3 p[3];
+    DVec3 p[3];
+    for (int k = 0; k < 3; ++k) {
+        p[k] =
+            rays_from_object * DVec3(mesh.positions[mesh.triangles[t][k]]) / double(spacing) + off;
+    }
+    const int axis = rayAxis(mesh, t, rays_from_object);
+    const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+    const DVec2 q[3] = {{p[0][a], p[0][b]}, {p[1][a], p[1][b]}, {p[2][a], p[2][b]}};
+    const double low = std::min({q[0].y, q[1].y, q[2].y}),
+                 high = std::max({q[0].y, q[1].y, q[2].y});
+    const DVec2 e1 = q[1] - q[0], e2 = q[2] - q[0];
+    const double determinant = e1.x * e2.y - e1.y * e2.x;
+    if (determinant == 0.0) return;
+    for (int64_t j = int64_t(std::ceil(low)); double(j) < high; ++j) {
+        double from = 1e300, to = -1e300;
         for (int k = 0; k < 3; ++k) {
-            p[k] = grid_from_object * (DVec3(mesh.positions[mesh.triangles[t][k]]) - origin) + off;
+            const DVec2 &c = q[k], &d = q[(k + 1) % 3];
+            if ((c.y > double(j)) == (d.y > double(j))) continue;
+            const double at = c.x + (d.x - c.x) * (double(j) - c.y) / (d.y - c.y);
+            from = std::min(from, at), to = std::max(to, at);
         }
-        const DVec3 n = glm::abs(glm::cross(p[1] - p[0], p[2] - p[0]));
-        const int axis = n.z >= n.x && n.z >= n.y ? 2 : n.y >= n.x ? 1 : 0;
-        const double twice_area = n[axis];
-        if (!(twice_area > 0.0)) continue;
-        const int a = (axis + 1) % 3, b = (axis + 2) % 3;
-        const DVec2 q[3] = {{p[0][a], p[0][b]}, {p[1][a], p[1][b]}, {p[2][a], p[2][b]}};
-        const double low = std::min({q[0].y, q[1].y, q[2].y}),
-                     high = std::max({q[0].y, q[1].y, q[2].y});
-        const DVec2 e1 = q[1] - q[0], e2 = q[2] - q[0];
-        const double determinant = e1.x * e2.y - e1.y * e2.x;
-        for (int64_t j = int64_t(std::ceil(low)); double(j) < high; ++j) {
-            double from = 1e300, to = -1e300;
-            for (int k = 0; k < 3; ++k) {
-                const DVec2 &c = q[k], &d = q[(k + 1) % 3];
-                if ((c.y > double(j)) == (d.y > double(j))) continue;
-                const double at = c.x + (d.x - c.x) * (double(j) - c.y) / (d.y - c.y);
-                from = std::min(from, at), to = std::max(to, at);
-            }
-            for (int64_t i = int64_t(std::ceil(std::max(from, -1e15))); double(i) < to; ++i) {
-                const DVec2 r = DVec2(double(i), double(j)) - q[0];
-                const double u = (r.x * e2.y - r.y * e2.x) / determinant,
-                             v = (e1.x * r.y - e1.y * r.x) / determinant;
-                SurfelSample s;
-                if (!sampleAt(surface, t, float(std::clamp(u, 0.0, 1.0)),
-                              float(std::clamp(v, 0.0, 1.0 - std::clamp(u, 0.0, 1.0))), spacing, s))
-                    continue;
-                s.levels = gridLevels(i, j);
-                out.push_back(s);
-            }
+        for (int64_t i = int64_t(std::ceil(std::max(from, -1e15))); double(i) < to; ++i) {
+            const DVec2 r = DVec2(double(i), double(j)) - q[0];
+            const double u = (r.x * e2.y - r.y * e2.x) / determinant,
+                         v = (e1.x * r.y - e1.y * r.x) / determinant;
+            SurfelSample s;
+            if (!sampleAt(surface, t, float(std::clamp(u, 0.0, 1.0)),
+                          float(std::clamp(v, 0.0, 1.0 - std::clamp(u, 0.0, 1.0))), spacing, s))
+                continue;
+            s.levels = gridLevels(i, j);
+            out.push_back(s);
         }
     }
 }
 
 namespace {
 
-// A border's edge, between two clusters or at the end of the surface.
+// A border's edge, between two pieces or at the end of the surface.
 struct BorderEdge {
-    uint32_t owner, other;  // clusters
+    uint32_t owner, other;  // pieces
     SharedEdge edge;
     uint32_t triangle;  // of the owner
 };
 
-// Walks the edges that two clusters share, in runs from end to end.
+// Walks the edges that two pieces share, in runs from end to end.
 class BorderWalk {
 public:
     BorderWalk(const SampledSurface& surface, const std::vector<uint32_t>& places,
@@ -190,54 +204,107 @@ private:
 }  // namespace
 
 std::vector<std::vector<SurfelSample>> sampleBorders(const SampledSurface& surface,
-                                                     const FaceClusters& clusters,
-                                                     const std::vector<float>& spacing) {
+                                                     const SampledPieces& pieces) {
+    const auto spacingOf = [&](uint32_t piece) { return pieces.spacing[pieces.patch_of[piece]]; };
     std::vector<BorderEdge> borders;
     for (const SharedEdge& e : sharedEdges(surface.mesh)) {
-        const uint32_t a = clusters.cluster_of[e.a],
-                       b = e.b == kNoTriangle ? kNoTriangle : clusters.cluster_of[e.b];
+        const uint32_t a = pieces.piece_of[e.a],
+                       b = e.b == kNoTriangle ? kNoTriangle : pieces.piece_of[e.b];
         if (a == b) continue;
-        const bool a_owns = b == kNoTriangle || std::tie(spacing[a], a) < std::tie(spacing[b], b);
+        const bool a_owns =
+            b == kNoTriangle || std::pair(spacingOf(a), a) < std::pair(spacingOf(b), b);
         borders.push_back({a_owns ? a : b, a_owns ? b : a, e, a_owns ? e.a : e.b});
     }
     std::stable_sort(borders.begin(), borders.end(), [](const BorderEdge& x, const BorderEdge& y) {
         return std::tie(x.owner, x.other) < std::tie(y.owner, y.other);
     });
     const std::vector<uint32_t> places = placesOf(surface.mesh);
-    std::vector<std::vector<SurfelSample>> samples(clusters.is_flat.size());
+    std::vector<std::vector<SurfelSample>> samples(pieces.spacing.size());
     for (size_t begin = 0; begin < borders.size();) {
         size_t end = begin;
         while (end < borders.size() && borders[end].owner == borders[begin].owner &&
                borders[end].other == borders[begin].other)
             ++end;
         const uint32_t owner = borders[begin].owner;
-        BorderWalk(surface, places, borders.data() + begin, borders.data() + end, spacing[owner],
-                   samples[owner]);
+        BorderWalk(surface, places, borders.data() + begin, borders.data() + end, spacingOf(owner),
+                   samples[pieces.patch_of[owner]]);
         begin = end;
     }
     return samples;
 }
 
-void dropDoubles(std::vector<SurfelSample>& samples, float spacing) {
-    // The diagonal of a cell is shorter than the spacing: no two samples of one grid share one.
-    const float cell = 0.55f * spacing;
+namespace {
+
+// Keeps samples, in their order, that have none of those kept before within `distance` that face
+// the same way.
+class Thinner {
+public:
+    Thinner(const std::vector<SurfelSample>& samples, float distance)
+        : samples_(samples), distance_(distance) {}
+
+    bool keep(uint32_t index) {
+        const Surfel& s = samples_[index].surfel;
+        const Vec3 cell = glm::floor(s.position / distance_);
+        for (int n = 0; n < 27; ++n) {
+            const Vec3 other =
+                cell + Vec3(float(n % 3 - 1), float(n / 3 % 3 - 1), float(n / 9 - 1));
+            const auto found = kept_.find(keyOf(other));
+            if (found == kept_.end()) continue;
+            for (uint32_t k = found->second; k != kNone; k = next_[k]) {
+                const Surfel& t = samples_[of_[k]].surfel;
+                const Vec3 d = t.position - s.position;
+                if (glm::dot(d, d) < distance_ * distance_ && glm::dot(t.normal, s.normal) > 0.0f)
+                    return false;
+            }
+        }
+        const auto [at, is_new] = kept_.emplace(keyOf(cell), kNone);
+        next_.push_back(is_new ? kNone : at->second);
+        of_.push_back(index);
+        at->second = uint32_t(of_.size() - 1);
+        return true;
+    }
+
+private:
+    static constexpr uint32_t kNone = 0xffffffffu;
+    static uint64_t keyOf(const Vec3& cell) {
+        return hashCombine(uint64_t(int64_t(cell.x)), uint64_t(int64_t(cell.y)),
+                           uint64_t(int64_t(cell.z)));
+    }
+    const std::vector<SurfelSample>& samples_;
+    const float distance_;
+    std::unordered_map<uint64_t, uint32_t> kept_;  // the last kept of a cell
+    std::vector<uint32_t> next_, of_;
+};
+
+}  // namespace
+
+void thinToLevels(std::vector<SurfelSample>& samples, float spacing, size_t few) {
+    // Doubles are much nearer; of a square grid every second place is farther away.
+    constexpr float kDouble = 0.5f, kThinned = 0.75f;
     std::stable_sort(
         samples.begin(), samples.end(),
         [](const SurfelSample& a, const SurfelSample& b) { return a.levels > b.levels; });
-    std::unordered_set<uint64_t> taken;
+    Thinner first(samples, kDouble * spacing);
     size_t kept = 0;
-    for (const SurfelSample& s : samples) {
-        const Vec3& n = s.surfel.normal;
-        const Vec3 q = glm::floor(s.surfel.position / cell);
-        const Vec3 m = glm::abs(n);
-        const int axis = m.z >= m.x && m.z >= m.y ? 2 : m.y >= m.x ? 1 : 0;
-        const uint64_t facing = uint64_t(axis * 2 + (n[axis] < 0.0f ? 1 : 0));
-        const uint64_t key =
-            hashCombine(hashCombine(uint64_t(int64_t(q.x)), uint64_t(int64_t(q.y))),
-                        uint64_t(int64_t(q.z)), facing);
-        if (taken.insert(key).second) samples[kept++] = s;
+    std::vector<uint8_t> is_kept(samples.size());
+    for (uint32_t i = 0; i < samples.size(); ++i) is_kept[i] = first.keep(i);
+    for (uint32_t i = 0; i < samples.size(); ++i) {
+        if (is_kept[i]) samples[kept++] = samples[i];
     }
     samples.resize(kept);
+    std::vector<uint32_t> level(samples.size()), next;
+    for (uint32_t i = 0; i < samples.size(); ++i) level[i] = i, samples[i].levels = 1;
+    for (int l = 1; l < kMostLevels; ++l) {
+        Thinner thinner(samples, kThinned * spacing * std::exp2(0.5f * float(l)));
+        next.clear();
+        for (const uint32_t i : level) {
+            if (thinner.keep(i)) next.push_back(i);
+        }
+        // What a level does not make sparser, another would not either.
+        if (next.size() < few || next.size() * 10 > level.size() * 9) return;
+        for (const uint32_t i : next) samples[i].levels = uint8_t(l + 1);
+        std::swap(level, next);
+    }
 }
 
 }  // namespace stipple

@@ -15,7 +15,7 @@ namespace stipple {
 struct SurfelSample {
     Surfel surfel;
     uint32_t finish_key = 0;
-    uint8_t levels = 1;
+    uint8_t levels = 1;  // as drawn: of its grid or line alone, until thinToLevels()
 };
 
 // What is sampled.
@@ -25,21 +25,32 @@ struct SampledSurface {
     const std::vector<Texture>& textures;
 };
 
-// Where rays of three grids, `spacing` apart, along `normal` and two directions across, meet a
-// cluster's triangles: those of the grid that a triangle faces best, so that no place is sampled
-// three times. Appends to out. O(triangles + samples).
-void sampleFaces(const SampledSurface& surface, const std::vector<uint32_t>& triangles,
-                 const Vec3& normal, float spacing, std::vector<SurfelSample>& out);
+// The three directions of a flat cluster's rays: along its normal and across.
+DMat3 raysFromObject(const Vec3& normal);
 
-// Places on the corners and along the borders of all clusters, between two of them once, for the
-// one whose spacing is the smaller; no farther apart than its spacing. spacing: one a cluster. The
-// result has one list a cluster. O(n log n).
+// Of the three, the one that a triangle faces best. Its rays alone sample the triangle, so that no
+// place is sampled three times.
+int rayAxis(const Mesh& mesh, uint32_t triangle, const DMat3& rays_from_object);
+
+// Where rays `spacing` apart meet a triangle. Appends to out. O(samples).
+void sampleFace(const SampledSurface& surface, uint32_t triangle, const DMat3& rays_from_object,
+                float spacing, std::vector<SurfelSample>& out);
+
+// What one grid samples.
+struct SampledPieces {
+    std::vector<uint32_t> piece_of;  // one a triangle
+    std::vector<uint32_t> patch_of;  // one a piece
+    std::vector<float> spacing;      // one a patch
+};
+// Places on the corners and along the borders of all pieces, between two of them once, for the
+// one whose spacing is the smaller; no farther apart than its spacing. The result has one list a
+// patch. O(n log n).
 std::vector<std::vector<SurfelSample>> sampleBorders(const SampledSurface& surface,
-                                                     const FaceClusters& clusters,
-                                                     const std::vector<float>& spacing);
+                                                     const SampledPieces& pieces);
 
 // Leaves out all but one of the samples that lie much nearer to each other than the spacing and
-// face the same way: those of fewer levels go first.
-void dropDoubles(std::vector<SurfelSample>& samples, float spacing);
+// face the same way, and numbers the levels of the others: each level is the one before, thinned
+// evenly to about half, down to `few`. Places of even number in their grids stay longest. O(n).
+void thinToLevels(std::vector<SurfelSample>& samples, float spacing, size_t few);
 
 }  // namespace stipple
