@@ -13,7 +13,8 @@ namespace stipple {
 
 namespace {
 
-constexpr double kFitWeight = 200.0;   // of the mean squared distance over the area
+constexpr double kTurnWeight = 10.0;  // of (1 - cosine)^2: a whole turn of 45 degrees costs 1
+constexpr double kFitWeight = 20.0;   // of the mean squared distance over the area
 constexpr double kSizeWeight = 0.25;  // phase two: for a cluster of the largest size
 constexpr uint32_t kNone = 0xffffffffu;
 
@@ -184,7 +185,7 @@ private:
         }
         double fit;
         const DVec3 n = planeOf(s, fit);
-        return kFitWeight * fit / std::max(s.area, 1e-30) + turnOf(s, n) + shape;
+        return kFitWeight * fit / std::max(s.area, 1e-30) + kTurnWeight * turnOf(s, n) + shape;
     }
 
     void push(uint32_t a, const Neighbour& n, bool is_first) {

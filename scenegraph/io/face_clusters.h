@@ -14,7 +14,7 @@ namespace stipple {
 struct ClusterOptions {
     // Costs have no unit: how far a cluster is from a plane for its size, how much its normals
     // turn, and how much less compact it is than its parts (negative if it is more so).
-    double phase_one = 0.2;   // flat clusters grow up to this cost
+    double phase_one = 0.3;   // flat clusters grow up to this cost
     double phase_two = 0.1;   // small ones are joined, flat or not, up to this cost
     int clusters = 0;         // in place of the costs: this many after phase one, 0: by cost
     double flat_share = 0.0;  // phase two ends when no more of the triangles are in flat clusters

@@ -35,7 +35,7 @@ const HelpText kHelp = {
     "(0.15); neighbours (12), points (200000, taken on meshes), relax (on|off), naive (on|off). "
     "hybrid: "
     "patches of the surface, each as triangles and as surfels, drawn by what costs less in a view: "
-    "phase_one (0.2), phase_two (0.1), clusters (0: by these costs), flat_share (0), largest "
+    "phase_one (0.3), phase_two (0.1), clusters (0: by these costs), flat_share (0), largest "
     "(1000), sampling (3), spacing (0), keep (both|triangles|surfels|flatness), paint "
     "(source|clusters), tolerance (0.1, of clouds' splats).",
     {"stipple build tree.glb --as point-blocks -o tree.stipple",
