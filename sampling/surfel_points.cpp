@@ -78,7 +78,7 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     for (const SurfelBlock& block : level.blocks) {
         const Vec3 center(frame.camera_from_object.point(DVec3(block.bounds.center())));
         float radius = 0.5f * glm::length(block.bounds.extent()) * reach;
-        if (with_discs) radius += kDiscSide * level.spacing * scale * 4.0f;
+        if (with_discs) radius += model.discSide() * level.spacing * scale * 4.0f;
         if (center.z + radius <= view.near_z || center.z - radius > view.far_z) continue;
         const SubpixelRect rect = ballRect(view, center, radius, region);
         if (!rect.overlaps(region) || isHiddenFromEye(frame, model, block)) continue;
@@ -210,7 +210,7 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
             const Surfel s = unpackSurfel(level, b, k);
             const Vec3 center(to_camera.point(DVec3(s.position)));
             const Vec3 other = std::abs(s.normal.x) < 0.7f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
-            const float half = 0.5f * kDiscSide * level.spacing * s.radius_share;
+            const float half = 0.5f * placed.model.discSide() * level.spacing * s.radius_share;
             const Vec3 a_object = glm::normalize(glm::cross(s.normal, other)) * half;
             const Vec3 a = linear * a_object, c = linear * glm::cross(s.normal, a_object);
             Vec3 corners[4] = {center - a - c, center + a - c, center + a + c, center + c - a};

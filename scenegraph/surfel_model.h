@@ -18,6 +18,8 @@ namespace stipple {
 inline constexpr int kBlockSurfels = 64;  // most of a block
 // Discs are squares; on a mesh of points whose sides are a spacing, this many spacings close it.
 inline constexpr float kDiscSide = 1.25f;
+// The same for samples of tilted grids (SurfelModel::leaves_no_holes).
+inline constexpr float kGridDiscSide = 1.65f;
 
 // Up to 64 surfels that lie near each other and face about the same way.
 struct SurfelBlock {
@@ -74,9 +76,11 @@ struct SurfelModel {
     std::vector<SurfelFinish> finishes;  // at most 256
     std::vector<SurfelLevel> levels;     // finest first, each about twice the spacing of the last
 
-    // Whether no more points than the spacing asks for leave no holes; else they close them by
-    // their patches' widths.
+    // Whether points a spacing apart leave no holes; else they close them by their patches' widths,
+    // and discs are larger.
     bool leaves_no_holes = true;
+
+    float discSide() const { return leaves_no_holes ? kDiscSide : kGridDiscSide; }
 
     size_t bytes() const;
 };

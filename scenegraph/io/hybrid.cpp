@@ -57,8 +57,6 @@ namespace {
 constexpr size_t kPatchTriangles = 256;                           // smaller clusters share a patch
 constexpr size_t kFewSurfels = 16;                                // levels end there
 constexpr double kFinest = 1.0 / 8192.0, kCoarsest = 1.0 / 64.0;  // spacings, of the diagonal
-// No place between the grid's is farther from a surfel than a disc of this many steps reaches.
-constexpr float kSpacingPerStep = 1.3f;
 constexpr double kMostSamples = double(1 << 27);
 
 // What a model is made of.
@@ -305,7 +303,7 @@ private:
             }
             if (surfels.empty()) return;
             levels.push_back(packSurfels(std::move(surfels), finishes,
-                                         kSpacingPerStep * spacing * std::exp2(0.5f * float(l)),
+                                         spacing * std::exp2(0.5f * float(l)),
                                          false));
         }
     }
