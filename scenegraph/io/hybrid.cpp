@@ -255,7 +255,7 @@ private:
                        (h * h);
         }
         if (samples > kMostSamples)
-            throw Error(ErrorCode::kUnsupported, "--set",
+            throw Error(ErrorCode::kInvalidArgument, "--set",
                         "more than 2^27 surfels: take a coarser spacing or sampling");
     }
 
@@ -303,8 +303,7 @@ private:
             }
             if (surfels.empty()) return;
             levels.push_back(packSurfels(std::move(surfels), finishes,
-                                         spacing * std::exp2(0.5f * float(l)),
-                                         false));
+                                         spacing * std::exp2(0.5f * float(l)), false));
         }
     }
 

@@ -37,7 +37,8 @@ struct HybridReport {
 
 // Of all that the scene's root shows: of point clouds by their splats, where there is nothing else.
 // The same model for any number of threads. progress may be called from any thread, one at a time.
-// Throws kInvalidScene if there is nothing, kUnsupported, kCancelled. O(n log n).
+// Throws kInvalidScene if there is nothing, kInvalidArgument for more than 2^27 surfels,
+// kUnsupported, kCancelled. O(n log n).
 HybridModel buildHybrid(const Scene& scene, const HybridOptions& options, ThreadPool& pool,
                         const CancelFlag& cancel,
                         const std::function<void(double fraction)>& progress, HybridReport& report);
