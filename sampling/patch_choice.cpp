@@ -16,8 +16,10 @@ constexpr float kMostError = 0.5f;  // subpixels
 constexpr double kBelowLarge = 0.9;
 
 // Costs, in nanoseconds on one core, measured: a surfel of the level, a point on a triangle, a
-// triangle and a subpixel that it covers.
-constexpr double kSurfelCost = 15.0, kPointCost = 60.0, kTriangleCost = 40.0, kSubpixelCost = 20.0;
+// triangle, a subpixel that it covers, and what looking a subpixel's textures up adds to shading
+// it.
+constexpr double kSurfelCost = 15.0, kPointCost = 60.0, kTriangleCost = 40.0, kSubpixelCost = 20.0,
+                 kTextureCost = 200.0;
 
 }  // namespace
 
@@ -50,9 +52,11 @@ uint32_t choosePatch(const Scene& scene, const MeshPatch& patch, const BoxProjec
         // Half of a surface faces the eye, at any angle: a quarter of its area is seen.
         const double covered = std::min(0.25 * projectedArea(mesh.area, bound), 1e12);
         const bool are_points = largest <= settings.area_threshold * kSurfaceThreshold;
-        const double cost =
+        const double shading = patch.is_textured ? kTextureCost * covered : 0.0;
+        const double drawing =
             are_points ? kPointCost * 4.0 * covered * settings.samples
                        : kTriangleCost * double(mesh.triangles.size()) + kSubpixelCost * covered;
+        const double cost = drawing + shading;
         if (cost < least) least = cost, best = level.mesh;
     }
     return best;

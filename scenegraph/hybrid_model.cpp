@@ -152,6 +152,9 @@ ChildRef addHybridModel(Scene& scene, HybridModel model, const std::string& name
     for (HybridPatch& from : model.patches) {
         MeshPatch patch;
         for (const TriangleLevel& level : from.triangles) {
+            for (const uint16_t m : level.material)
+                patch.is_textured =
+                    patch.is_textured || scene.materials[first_material + m].isTextured();
             Mesh part = partOf(model, level);
             for (const Vec3& p : part.positions) patch.bounds.extend(p);
             patch.triangles.push_back({add(std::move(part)), level.error});

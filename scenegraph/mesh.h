@@ -53,6 +53,7 @@ struct MeshPatch {
     Box3 bounds;                       // object space
     std::vector<Triangles> triangles;  // finest first
     uint32_t surfels = kNoMesh;        // a mesh that has nothing but them
+    bool is_textured = false;          // its triangles are; surfels have their colours
 };
 
 struct Mesh {

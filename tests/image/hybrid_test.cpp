@@ -10,6 +10,7 @@
 #include <scenegraph/procedural/generators.h>
 #include <scenegraph/scene_editor.h>
 
+#include <cstdlib>
 #include <filesystem>
 
 namespace stipple {
@@ -110,6 +111,35 @@ TEST(Hybrid, everyReconstructionShowsIt) {
         const Image picture = draw(model, camera, 160, Method::kPoints, 1, pool, 1, method);
         EXPECT_GE(compareImages(picture, rays, pool).psnr, 24.0) << int(method);
         EXPECT_LE(compareImages(picture, rays, pool).holes->count, 2u) << int(method);
+    }
+}
+
+// Models of the test data, from 100 directions and at as many sizes.
+TEST(Hybrid, realModelsHaveNoHolesAndLookLikeRays) {
+    const char* folder = std::getenv("STIPPLE_TEST_DATA");
+    if (!folder || !*folder) GTEST_SKIP() << "no test data (STIPPLE_TEST_DATA)";
+    ThreadPool pool(2);
+    const CancelFlag cancel;
+    for (const char* file : {"bunny/bunny.glb", "dragon_medium.glb", "spot/spot.glb"}) {
+        const std::filesystem::path path = std::filesystem::path(folder) / "meshes" / file;
+        if (!std::filesystem::exists(path)) GTEST_SKIP() << "no test data " << path;
+        Diagnostics diagnostics;
+        Scene source = loadScene(path.string(), {true, 0, nullptr}, pool, diagnostics);
+        Scene model = modelOf(source, HybridOptions(), pool);
+        model.lighting = source.lighting;
+        size_t holes = 0;
+        double worst = 1e9;
+        for (int i = 0; i < 100; ++i) {
+            const Camera camera =
+                cameraTo(source, maskDirectionOf(i * 37 % kMaskDirections), 30.0 + 2.0 * i, 96);
+            const Image rays = draw(source, camera, 96, Method::kRaycast, 16, pool),
+                        picture = draw(model, camera, 96, Method::kPoints, 1, pool, 4);
+            const auto result = compareImages(picture, rays, pool);
+            holes += result.holes->count;
+            worst = std::min(worst, result.psnr);
+        }
+        EXPECT_GE(worst, 28.0) << file;
+        EXPECT_LE(holes, 0u) << file;
     }
 }
 
