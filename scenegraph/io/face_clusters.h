@@ -30,9 +30,9 @@ struct FaceClusters {
 };
 
 // Clusters are numbered in the order of their first triangles. Triangles are joined across edges
-// that two of them share, by position, if they have the same material. Vertices: positions and
-// triangles of the mesh alone are looked at, and need not be built. A higher cost never gives more
-// clusters, and each is a union of those of a lower one. Throws kCancelled. O(n log n).
+// that two of them share, by position, if they have the same material. The mesh need not be built.
+// A phase that ends at a higher cost never gives more clusters, and each is a union of those of a
+// lower one, for the same triangles to begin with. Throws kCancelled. O(n log n).
 FaceClusters clusterFaces(const Mesh& mesh, const ClusterOptions& options,
                           const CancelFlag& cancel);
 

@@ -11,11 +11,11 @@
 
 namespace stipple {
 
-// A surfel is part of the levels [0, levels): each has about half the surfels of the one before.
+// A surfel is part of the levels [0, levels).
 struct SurfelSample {
     Surfel surfel;
     uint32_t finish_key = 0;
-    uint8_t levels = 1;  // as drawn: of its grid or line alone, until thinToLevels()
+    uint8_t levels = 1;  // until thinToLevels(): of its grid or line alone
 };
 
 // What is sampled.

@@ -28,7 +28,7 @@ ClusterOptions firstPhase(double cost) {
     return options;
 }
 
-// How many parts each cluster falls into, along edges that its triangles share.
+// Along edges that their triangles share.
 void expectConnected(const Mesh& mesh, const std::vector<uint32_t>& cluster_of, size_t clusters) {
     std::vector<uint32_t> parent(mesh.triangles.size());
     std::iota(parent.begin(), parent.end(), 0u);
