@@ -170,10 +170,13 @@ void SurfelPoints::addWidths(const Placed& placed, const SurfelBlock& b) {
     const float z = view.orthographic ? 1.0f : std::max(center.z, view.near_z);
     const int offset = int(std::lround(std::log2(float(view.focal) / z) * kWidthsPerOctave)) +
                        (kFirstMetreExponent - kFirstSubpixelExponent) * kWidthsPerOctave;
+    // There are one to two of a grid's samples a subpixel: on wider patches than those whose holes
+    // are closed they would widen silhouettes.
+    const int widest = placed.model.leaves_no_holes ? kWidthCodes - 1 : int(kSurfaceCode);
     for (int i = 0; i < block_.count; ++i) {
         const int code =
             placed.width_codes[placed.level.albedo_finish[b.first + uint32_t(i)] >> 24];
-        block_.width[i] = uint8_t(std::clamp(code + offset, 1, kWidthCodes - 1));
+        block_.width[i] = uint8_t(std::clamp(code + offset, 1, widest));
     }
 }
 
