@@ -52,6 +52,16 @@ void checkMaterials(const HybridModel& model, const std::string& where) {
 }  // namespace
 
 void checkHybridModel(const HybridModel& model, const std::string& where) {
+    const Mesh& mesh = model.mesh;
+    const auto checkLength = [&](const auto& values) {
+        check(values.empty() || values.size() == mesh.positions.size(), where,
+              "has arrays of different lengths");
+    };
+    checkLength(mesh.normals);
+    checkLength(mesh.uvs);
+    checkLength(mesh.tangents);
+    checkLength(mesh.colors);
+    for (const auto& layer : mesh.more_uvs) checkLength(layer);
     check(!model.patches.empty(), where, "has no patches");
     checkMaterials(model, where);
     checkSurfelFinishes(model.finishes, where);

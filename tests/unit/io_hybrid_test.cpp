@@ -89,7 +89,8 @@ TEST(Hybrid, surfelsCoverTheSurfaceAtEveryLevel) {
                 points.insert(points.end(), some.begin(), some.end());
                 spacing = std::max(spacing, level.spacing);
             }
-            for (const Vec3& p : places) EXPECT_LE(distanceTo(points, p), reach * spacing) << kind << l;
+            for (const Vec3& p : places)
+                EXPECT_LE(distanceTo(points, p), reach * spacing) << kind << l;
         }
     }
 }
@@ -250,6 +251,10 @@ TEST(HybridFile, refusesWhatIsDamaged) {
         errorOf(
             withChecksum(forged.substr(0, 32 + size_t(rng.uniform(0, double(text.size() - 32))))));
     }
+    HybridModel shorter = build(sceneOf(torus(300)), HybridOptions());
+    shorter.mesh.normals.pop_back();
+    EXPECT_NE(errorOf(hybridFileText(shorter)).find("arrays of different lengths"),
+              std::string::npos);
     std::string newer = text;
     newer[8] = 9;
     EXPECT_NE(errorOf(newer).find("has version 9"), std::string::npos);
