@@ -2,6 +2,7 @@
 #include <sampling/frame_plan.h>
 
 #include <sampling/node_class.h>
+#include <sampling/patch_choice.h>
 #include <sampling/projection.h>
 #include <scenegraph/object_id.h>
 
@@ -65,19 +66,33 @@ private:
 
     void visitMesh(const Pending& p) {
         const Mesh& mesh = scene_.meshes[p.child.index()];
-        if (mesh.triangles.empty()) return;
+        if (mesh.triangles.empty() && !mesh.surfels) return;
         const BoxProjection box = projectBox(view_, p.camera_from_child.linear,
                                              p.camera_from_child.translation, mesh.nodes[0].bounds);
         if (!box.is_visible) return;
         const double area_scale = maxAreaScale(p.camera_from_child.linear);
         if (mesh.surfels && !rasterize_all_) {  // opens its own blocks
-            addBatch(p, box, std::min(mesh.area * box.bound * area_scale, 1e9));
+            addBatch(p, box, std::min(mesh.surfels->area * box.bound * area_scale, 1e9));
+            return;
+        }
+        if (drawsPatches(mesh, box, settings_) && !rasterize_all_) {
+            visitPatches(p, mesh, area_scale);
             return;
         }
         if (rasterize_all_ || mayBeLarge(mesh.nodes[0].max_triangle_area, box.bound * area_scale)) {
             collectLargeTriangles(p, mesh, area_scale);
         }
         if (!rasterize_all_) addMeshBatches(p, mesh, box, area_scale);
+    }
+
+    void visitPatches(const Pending& p, const Mesh& mesh, double area_scale) {
+        for (const MeshPatch& patch : mesh.patches) {
+            const BoxProjection box = projectBox(view_, p.camera_from_child.linear,
+                                                 p.camera_from_child.translation, patch.bounds);
+            if (!box.is_visible) continue;
+            const uint32_t chosen = choosePatch(scene_, patch, box, area_scale, view_, settings_);
+            visitMesh({p.camera_from_child, ChildRef::mesh(chosen), 0, p.path});
+        }
     }
 
     // Parts no larger than a tile, so that they sort among the other batches.

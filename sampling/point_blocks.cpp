@@ -3,6 +3,7 @@
 
 #include <core/option_text.h>
 #include <core/stopwatch.h>
+#include <scenegraph/surfel_finish.h>
 #include <scenegraph/visible_area.h>
 
 #include <algorithm>
@@ -120,32 +121,16 @@ Picture testPicture(const Vec3& to_viewer, int test, float pixel, float radius) 
 
 class Builder {
 public:
-    Builder(const RayCaster& caster, const std::vector<Material>& materials,
-            const std::vector<float>& patch_width, double radius, const PointBlockOptions& options,
-            ThreadPool& pool, const CancelFlag& cancel)
+    Builder(const RayCaster& caster, const std::vector<Material>& materials, double radius,
+            const PointBlockOptions& options, ThreadPool& pool, const CancelFlag& cancel)
         : caster_(caster),
           materials_(materials),
-          patch_width_(patch_width),
           radius_(float(radius)),
           options_(options),
           pool_(pool),
           cancel_(cancel) {}
 
     PointBlockReport report;
-
-    // By key, in order.
-    std::map<uint32_t, uint8_t> finishIndices(const std::vector<std::vector<Sample>>& levels,
-                                              std::vector<SurfelFinish>& finishes) const {
-        std::map<uint32_t, uint8_t> index_of;
-        for (const std::vector<Sample>& samples : levels) {
-            for (const Sample& s : samples) index_of[s.finish_key] = 0;
-        }
-        for (auto& [key, index] : index_of) {
-            index = uint8_t(finishes.size());
-            finishes.push_back(makeFinish(key));
-        }
-        return index_of;
-    }
 
     // Samples without holes where pixels are that large.
     std::vector<Sample> build(float pixel, const std::function<void(double)>& progress) {
@@ -223,8 +208,6 @@ public:
     }
 
 private:
-    static constexpr uint32_t kMostMaterials = 256, kFinishesEach = 16;
-
     void throwIfAsked() const {
         if (cancel_.requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
     }
@@ -273,7 +256,7 @@ private:
                     s.normal = hits[k].normal_world;
                     s.albedo = hits[k].albedo;
                     s.facing = std::abs(glm::dot(s.normal, to_viewer));
-                    s.finish_key = finishKey(hits[k]);
+                    s.finish_key = finishKey(materials_, hits[k].material, hits[k].finish);
                     of_row[row].push_back(s);
                 }
                 if (of_row[row].size() > before) begin_of_row[row].push_back(uint32_t(before));
@@ -288,45 +271,6 @@ private:
         block_begin.push_back(uint32_t(samples.size()));
         report.samples_hit += samples.size();
         report.rays = rays_cast_;
-    }
-
-    // Names a finish: material, and what its textures made of it, coarsely; of very many materials
-    // nothing but the material.
-    uint32_t finishKey(const RayHit& hit) const {
-        const auto level = [](float v, int n) {
-            return uint32_t(std::lround(std::clamp(v, 0.0f, 1.0f) * float(n)));
-        };
-        const uint32_t material = hit.material % kMostMaterials;
-        const Material& m = materials_[hit.material];
-        if (materials_.size() * kFinishesEach > size_t(kMostMaterials)) return material << 8;
-        const float most = std::max({m.emissive.x, m.emissive.y, m.emissive.z, 1e-6f});
-        const float shines =
-            std::max({hit.finish.emissive.x, hit.finish.emissive.y, hit.finish.emissive.z}) / most;
-        return material << 8 | level(hit.finish.metallic, 1) << 4 |
-               level(hit.finish.roughness, 3) << 1 | level(shines, 1);
-    }
-
-    SurfelFinish makeFinish(uint32_t key) const {
-        const Material& from = materials_[key >> 8];
-        SurfelFinish finish;
-        Material& m = finish.material;
-        m.name = from.name;
-        m.double_sided = from.double_sided;
-        m.translucency = from.translucency;
-        m.unlit = from.unlit;
-        m.specular = from.specular;
-        m.specular_weight = from.specular_weight;
-        finish.patch_width = patch_width_[key >> 8];
-        if (from.isTextured() && materials_.size() * kFinishesEach <= size_t(kMostMaterials)) {
-            m.metallic = float(key >> 4 & 1);
-            m.roughness = float(key >> 1 & 3) / 3.0f;
-            m.emissive = from.emissive * float(key & 1);
-        } else {
-            m.metallic = from.metallic;
-            m.roughness = from.roughness;
-            m.emissive = from.emissive;
-        }
-        return finish;
     }
 
     // Adds the view's blocks that what was chosen does not make up for.
@@ -407,7 +351,6 @@ private:
 
     const RayCaster& caster_;
     const std::vector<Material>& materials_;
-    const std::vector<float>& patch_width_;
     const float radius_;
     const PointBlockOptions& options_;
     ThreadPool& pool_;
@@ -428,7 +371,7 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
     const double radius = 0.5 * glm::length(bounds.max - bounds.min);
     if (bounds.isEmpty() || !(radius > 0.0))
         throw Error(ErrorCode::kInvalidArgument, "", "there is nothing to build a model of");
-    Builder builder(caster, materials, patch_width, radius, options, pool, cancel);
+    Builder builder(caster, materials, radius, options, pool, cancel);
     SurfelModel model;
     model.kind = "point-blocks";
     model.bounds = enclosingFloatBox(bounds);
@@ -446,7 +389,11 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
     }
     if (levels.empty())
         throw Error(ErrorCode::kInvalidArgument, "", "no ray hits anything: is it too fine?");
-    const std::map<uint32_t, uint8_t> index_of = builder.finishIndices(levels, model.finishes);
+    std::map<uint32_t, uint8_t> index_of;
+    for (const std::vector<Sample>& samples : levels) {
+        for (const Sample& s : samples) index_of[s.finish_key] = 0;
+    }
+    model.finishes = makeFinishes(materials, patch_width, index_of);
     for (size_t l = 0; l < levels.size(); ++l) {
         const float pixel = float(2.0 * radius / (options.resolution >> l));
         std::vector<Surfel> surfels;

@@ -11,8 +11,6 @@ namespace stipple {
 
 namespace {
 
-// Discs are squares; on a mesh of points whose sides are a spacing, this many spacings close it.
-constexpr float kDiscSide = 1.25f;
 // Discs no wider than this are drawn as points, too.
 constexpr float kFewSubpixels = 3.0f;
 // A model whose coarsest level is finer than this share of what is wanted is far.
@@ -61,7 +59,8 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         scale * float(view.focal) / (view.orthographic ? 1.0f : std::max(z_min, view.near_z));
     const float wanted = 1.0f / float(std::sqrt(context_.settings.samples));
     const int n_levels = int(model.levels.size());
-    if (model.levels.back().spacing * per_metre < kFarShare * wanted) return false;
+    if (!mesh.triangles.empty() && model.levels.back().spacing * per_metre < kFarShare * wanted)
+        return false;
     int l = n_levels - 1;
     while (l > 0 && model.levels[size_t(l)].spacing * per_metre > wanted) --l;
     const SurfelLevel& level = model.levels[size_t(l)];
@@ -79,7 +78,7 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     for (const SurfelBlock& block : level.blocks) {
         const Vec3 center(frame.camera_from_object.point(DVec3(block.bounds.center())));
         float radius = 0.5f * glm::length(block.bounds.extent()) * reach;
-        if (with_discs) radius += kDiscSide * level.spacing * scale * 4.0f;
+        if (with_discs) radius += model.discSide() * level.spacing * scale * 4.0f;
         if (center.z + radius <= view.near_z || center.z - radius > view.far_z) continue;
         const SubpixelRect rect = ballRect(view, center, radius, region);
         if (!rect.overlaps(region) || isHiddenFromEye(frame, model, block)) continue;
@@ -153,30 +152,42 @@ void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
     }
     const uint32_t number = addRun(placed, b.first, false);
     for (int i = 0; i < n; ++i) out.number[i] = number + uint32_t(i);
-    if (context_.sink->wantsSurfels()) {
-        addShapes(placed, b);
+    const bool with_shapes = context_.sink->wantsSurfels();
+    if (with_shapes || !placed.model.leaves_no_holes) {
+        addWidths(placed, b);
+        if (with_shapes) addShapes(placed, b);
     } else {
-        // There are enough of them to leave no holes: none need be wider than its subpixel.
+        // There are enough of them: none need be wider than its subpixel.
         std::fill(out.width, out.width + n, kNoPatch);
     }
     if (!context_.sink->take(out)) context_.runs.pop_back();
 }
 
-// Patch widths, normals and areas of the block that was just made.
-void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
-    const SurfelLevel& level = placed.level;
+// Patch widths of the block that was just made.
+void SurfelPoints::addWidths(const Placed& placed, const SurfelBlock& b) {
     const View& view = context_.view;
     const Vec3 center(placed.frame.camera_from_object.point(DVec3(b.bounds.center())));
     const float z = view.orthographic ? 1.0f : std::max(center.z, view.near_z);
     const int offset = int(std::lround(std::log2(float(view.focal) / z) * kWidthsPerOctave)) +
                        (kFirstMetreExponent - kFirstSubpixelExponent) * kWidthsPerOctave;
+    // There are one to two of a grid's samples a subpixel: on wider patches than those whose holes
+    // are closed they would widen silhouettes.
+    const int widest = placed.model.leaves_no_holes ? kWidthCodes - 1 : int(kSurfaceCode);
+    for (int i = 0; i < block_.count; ++i) {
+        const int code =
+            placed.width_codes[placed.level.albedo_finish[b.first + uint32_t(i)] >> 24];
+        block_.width[i] = uint8_t(std::clamp(code + offset, 1, widest));
+    }
+}
+
+// Its normals and areas.
+void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
+    const SurfelLevel& level = placed.level;
     // Discs with radii of their own cover all of the surface between them; what blends, less.
     const float side = level.spacing * placed.length_scale * (level.radius.empty() ? 1.0f : 0.5f);
     PointBlock& out = block_;
     for (int i = 0; i < out.count; ++i) {
         const uint32_t k = b.first + uint32_t(i);
-        const int code = placed.width_codes[level.albedo_finish[k] >> 24];
-        out.width[i] = uint8_t(std::clamp(code + offset, 1, kWidthCodes - 1));
         const Vec3 normal =
             glm::normalize(placed.frame.camera_from_normal * unpackNormal16(level.normal[k]));
         out.normal_x[i] = normal.x, out.normal_y[i] = normal.y, out.normal_z[i] = normal.z;
@@ -202,7 +213,7 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
             const Surfel s = unpackSurfel(level, b, k);
             const Vec3 center(to_camera.point(DVec3(s.position)));
             const Vec3 other = std::abs(s.normal.x) < 0.7f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
-            const float half = 0.5f * kDiscSide * level.spacing * s.radius_share;
+            const float half = 0.5f * placed.model.discSide() * level.spacing * s.radius_share;
             const Vec3 a_object = glm::normalize(glm::cross(s.normal, other)) * half;
             const Vec3 a = linear * a_object, c = linear * glm::cross(s.normal, a_object);
             Vec3 corners[4] = {center - a - c, center + a - c, center + a + c, center + c - a};

@@ -24,6 +24,7 @@ private:
     bool isHiddenFromEye(const InstanceFrame& frame, const SurfelModel& model,
                          const SurfelBlock& block) const;
     void drawPoints(const Placed& placed, const SurfelBlock& block);
+    void addWidths(const Placed& placed, const SurfelBlock& block);
     void addShapes(const Placed& placed, const SurfelBlock& block);
     void drawDiscs(const Placed& placed, const SurfelBlock& block);
     uint32_t addRun(const Placed& placed, uint32_t first, bool is_disc);

@@ -3,6 +3,7 @@
 
 #include <core/rng.h>
 #include <sampling/node_class.h>
+#include <sampling/patch_choice.h>
 #include <sampling/point_attributes.h>
 #include <scenegraph/object_id.h>
 
@@ -147,9 +148,14 @@ bool TileCut::drawAsPoints(ChildRef ref, uint32_t node_index, const Affine& came
 
 void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& camera_from_object,
                        uint64_t path, const BoxProjection& box) {
-    if (context_.scene.meshes[mesh_index].triangles.empty()) return;
+    const Mesh& mesh = context_.scene.meshes[mesh_index];
+    if (mesh.triangles.empty() && !mesh.surfels) return;
+    if (node_index == 0 && drawsPatches(mesh, box, context_.settings)) {
+        drawPatches(mesh, camera_from_object, path);
+        return;
+    }
     const InstanceFrame frame = makeInstanceFrame(camera_from_object, path);
-    if (context_.scene.meshes[mesh_index].surfels) {
+    if (mesh.surfels) {
         points_.flush();
         if (surfels_.draw(mesh_index, frame, box.z_min)) return;
     }
@@ -157,7 +163,7 @@ void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& c
     if (node_index == 0 && box.depth_ratio <= context_.settings.cut_ratio) {
         const RunDensity density = meshDensity(frame, box);
         seen = seeMesh(context_, frame, mesh_index, density);
-        const double count = density.drawn * context_.scene.meshes[mesh_index].area;
+        const double count = density.drawn * mesh.area;
         if (seen.hasVisible() && box.size <= float(context_.settings.visible_size) &&
             count * seen.visible_share <= double(kLongestList)) {
             addMeshPoints(context_, points_, frame, mesh_index, 0, seen, density, count);
@@ -167,6 +173,27 @@ void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& c
     }
     uint32_t triangle_frame = kNotTriangles;
     drawMeshNode(frame, mesh_index, seen, node_index, box, triangle_frame);
+}
+
+// What was not planned patch by patch, as it lies below a node that is a batch.
+void TileCut::drawPatches(const Mesh& mesh, const Affine& camera_from_object, uint64_t path) {
+    const size_t begin = opened_.size();
+    for (uint32_t i = 0; i < mesh.patches.size(); ++i)
+        collect(camera_from_object, mesh.patches[i].bounds, i, false);
+    sortCollected(begin);
+    const size_t end = opened_.size();
+    const double area_scale = maxAreaScale(camera_from_object.linear);
+    for (size_t k = begin; k < end; ++k) {
+        const Opened o = opened_[k];
+        if (isHidden(o.box)) continue;
+        const uint32_t chosen = choosePatch(context_.scene, mesh.patches[o.index], o.box,
+                                            area_scale, context_.view, context_.settings);
+        const BoxProjection box =
+            projectBox(context_.view, camera_from_object.linear, camera_from_object.translation,
+                       context_.scene.meshes[chosen].nodes[0].bounds);
+        if (box.is_visible) drawMesh(chosen, 0, camera_from_object, path, box);
+    }
+    opened_.resize(begin);
 }
 
 RunDensity TileCut::meshDensity(const InstanceFrame& frame, const BoxProjection& box) const {

@@ -36,6 +36,7 @@ private:
                       const BoxProjection& box);
     void drawMesh(uint32_t mesh, uint32_t node, const Affine& camera_from_object, uint64_t path,
                   const BoxProjection& box);
+    void drawPatches(const Mesh& mesh, const Affine& camera_from_object, uint64_t path);
     void drawMeshNode(const InstanceFrame& frame, uint32_t mesh, const SeenMesh& seen,
                       uint32_t node, const BoxProjection& box, uint32_t& triangle_frame);
     RunDensity meshDensity(const InstanceFrame& frame, const BoxProjection& box) const;

@@ -43,6 +43,20 @@ struct MeshNode {
 };
 inline constexpr uint8_t kMixedStratum = 255;
 
+// A part of a hybrid model's surface: meshes, one of which is drawn in its place, by what they cost
+// (sampling/patch_choice.h).
+struct MeshPatch {
+    static constexpr uint32_t kNoMesh = 0xffffffffu;
+    struct Triangles {
+        uint32_t mesh = kNoMesh;  // index into Scene::meshes
+        float error = 0.0f;       // object space, m
+    };
+    Box3 bounds;                       // object space
+    std::vector<Triangles> triangles;  // finest first
+    uint32_t surfels = kNoMesh;        // a mesh that has nothing but them
+    bool is_textured = false;          // its triangles are; surfels have their colours
+};
+
 struct Mesh {
     std::string name;
 
@@ -64,6 +78,10 @@ struct Mesh {
     // its finishes are the scene's materials from first_finish on. Null for meshes.
     std::shared_ptr<const SurfelModel> surfels;
     uint32_t first_finish = 0;
+
+    // A hybrid model's patches, which are drawn in place of the triangles where these are near.
+    std::vector<MeshPatch> patches;
+    bool is_patch = false;  // drawn as such alone: no group instances it
 
     // What buildMesh() adds; it also sorts the triangles (strata, then Morton order).
     std::vector<MeshNode> nodes;

@@ -92,7 +92,7 @@ const CameraPath* Scene::findPath(const std::string& name) const {
 SceneSize sceneSize(const Scene& scene) {
     SceneSize size;
     for (const Mesh& m : scene.meshes) {
-        size.triangles_unique += double(m.triangles.size());
+        if (!m.is_patch) size.triangles_unique += double(m.triangles.size());
         size.bytes += m.bytes();
     }
     for (const Texture& t : scene.textures) size.bytes += t.bytes();

@@ -225,51 +225,73 @@ Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t
     return s;
 }
 
-void checkSurfelModel(const SurfelModel& model, const std::string& where) {
-    const auto check = [&](bool condition, const char* what) {
-        if (!condition) throw Error(ErrorCode::kParse, where, what);
-    };
-    const auto isSane = [](const Vec3& v) {
-        constexpr float kMost = 1e15f;
-        return std::abs(v.x) < kMost && std::abs(v.y) < kMost && std::abs(v.z) < kMost;
-    };
-    check(model.kind == "point-blocks" || model.kind == "splats", "is a model of an unknown kind");
-    check(!model.levels.empty(), "holds no surfels");
-    check(!model.finishes.empty() && model.finishes.size() <= 256, "needs 1 to 256 finishes");
-    check(!model.bounds.isEmpty() && isSane(model.bounds.min) && isSane(model.bounds.max),
-          "has bounds that are no box");
-    check(model.area >= 0.0 && model.area < 1e30, "has an area that is no number");
-    for (const SurfelFinish& finish : model.finishes) {
-        const Material& m = finish.material;
-        const float values[] = {m.alpha,           m.metallic,     m.roughness,
-                                m.specular.x,      m.specular.y,   m.specular.z,
-                                m.emissive.x,      m.emissive.y,   m.emissive.z,
-                                m.specular_weight, m.translucency, finish.patch_width};
-        for (const float v : values)
-            check(v >= 0.0f && v < 1e15f, "has a finish that is no number");
+namespace {
+
+bool isSane(const Vec3& v) {
+    constexpr float kMost = 1e15f;
+    return std::abs(v.x) < kMost && std::abs(v.y) < kMost && std::abs(v.z) < kMost;
+}
+
+void check(bool condition, const std::string& where, const char* what) {
+    if (!condition) throw Error(ErrorCode::kParse, where, what);
+}
+
+}  // namespace
+
+void checkMaterialNumbers(const Material& m, const std::string& where) {
+    const float values[] = {m.alpha,      m.metallic,        m.roughness,   m.specular.x,
+                            m.specular.y, m.specular.z,      m.emissive.x,  m.emissive.y,
+                            m.emissive.z, m.specular_weight, m.translucency};
+    for (const float v : values)
+        check(v >= 0.0f && v < 1e15f, where, "has a finish that is no number");
+}
+
+void checkSurfelFinishes(const std::vector<SurfelFinish>& finishes, const std::string& where) {
+    check(finishes.size() <= 256, where, "has more than 256 finishes");
+    for (const SurfelFinish& finish : finishes) {
+        checkMaterialNumbers(finish.material, where);
+        check(finish.patch_width >= 0.0f && finish.patch_width < 1e15f, where,
+              "has a finish that is no number");
     }
-    for (const SurfelLevel& level : model.levels) {
+}
+
+void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes,
+                       const std::string& where) {
+    for (const SurfelLevel& level : levels) {
         const size_t n = level.size();
         check(level.normal.size() == n && level.albedo_finish.size() == n &&
                   (level.radius.empty() || level.radius.size() == n),
-              "has arrays of different lengths");
-        check(n > 0, "has a level without surfels");
-        check(level.spacing > 0.0f && level.spacing < 1e15f, "has a spacing that is no length");
+              where, "has arrays of different lengths");
+        check(n > 0, where, "has a level without surfels");
+        check(level.spacing > 0.0f && level.spacing < 1e15f, where,
+              "has a spacing that is no length");
         uint64_t next = 0;
         for (const SurfelBlock& block : level.blocks) {
             check(block.first == next && block.count >= 1 && block.count <= uint32_t(kBlockSurfels),
-                  "has blocks that do not follow each other");
+                  where, "has blocks that do not follow each other");
             next += block.count;
             check(!block.bounds.isEmpty() && isSane(block.bounds.min) && isSane(block.bounds.max),
-                  "has a block whose bounds are no box");
+                  where, "has a block whose bounds are no box");
             check(isSane(block.cone_apex) && isSane(block.cone_axis) &&
                       std::abs(block.cone_sine) < 1e15f,
-                  "has a block whose cone is no cone");
+                  where, "has a block whose cone is no cone");
         }
-        check(next == n, "has surfels that belong to no block");
+        check(next == n, where, "has surfels that belong to no block");
         for (const uint32_t bits : level.albedo_finish)
-            check((bits >> 24) < model.finishes.size(), "has a surfel without a finish");
+            check((bits >> 24) < n_finishes, where, "has a surfel without a finish");
     }
+}
+
+void checkSurfelModel(const SurfelModel& model, const std::string& where) {
+    check(model.kind == "point-blocks" || model.kind == "splats", where,
+          "is a model of an unknown kind");
+    check(!model.levels.empty(), where, "holds no surfels");
+    check(!model.finishes.empty(), where, "needs 1 to 256 finishes");
+    check(!model.bounds.isEmpty() && isSane(model.bounds.min) && isSane(model.bounds.max), where,
+          "has bounds that are no box");
+    check(model.area >= 0.0 && model.area < 1e30, where, "has an area that is no number");
+    checkSurfelFinishes(model.finishes, where);
+    checkSurfelLevels(model.levels, model.finishes.size(), where);
 }
 
 }  // namespace stipple

@@ -16,6 +16,10 @@
 namespace stipple {
 
 inline constexpr int kBlockSurfels = 64;  // most of a block
+// Discs are squares; on a mesh of points whose sides are a spacing, this many spacings close it.
+inline constexpr float kDiscSide = 1.25f;
+// The same for samples of tilted grids (SurfelModel::leaves_no_holes).
+inline constexpr float kGridDiscSide = 1.65f;
 
 // Up to 64 surfels that lie near each other and face about the same way.
 struct SurfelBlock {
@@ -72,6 +76,12 @@ struct SurfelModel {
     std::vector<SurfelFinish> finishes;  // at most 256
     std::vector<SurfelLevel> levels;     // finest first, each about twice the spacing of the last
 
+    // Whether points a spacing apart leave no holes; else they close them by their patches' widths,
+    // and discs are larger.
+    bool leaves_no_holes = true;
+
+    float discSide() const { return leaves_no_holes ? kDiscSide : kGridDiscSide; }
+
     size_t bytes() const;
 };
 
@@ -97,7 +107,11 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
                         float spacing, bool with_radii);
 Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t index);
 
-// Throws kParse (where: names the file) unless blocks, counts, numbers and finishes make sense.
+// Throw kParse (where: names the file) unless blocks, counts, numbers and finishes make sense.
 void checkSurfelModel(const SurfelModel& model, const std::string& where);
+void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes,
+                       const std::string& where);
+void checkSurfelFinishes(const std::vector<SurfelFinish>& finishes, const std::string& where);
+void checkMaterialNumbers(const Material& material, const std::string& where);
 
 }  // namespace stipple

@@ -32,7 +32,8 @@ bool hidesItself(const Mesh& mesh) {
     // So few triangles hide little of each other; a mesh of so many (a terrain) is seldom a plant,
     // and measuring it takes time and memory.
     constexpr size_t kFewTriangles = 64, kManyTriangles = 400000;
-    return mesh.triangles.size() >= kFewTriangles && mesh.triangles.size() <= kManyTriangles;
+    return !mesh.is_patch && mesh.triangles.size() >= kFewTriangles &&
+           mesh.triangles.size() <= kManyTriangles;
 }
 
 float SpacingTable::at(float spacing) const {

@@ -15,8 +15,12 @@ std::string surfelFileText(const SurfelModel& model);
 SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
                             const std::string& where);
 
-// The model as an asset: drawn by its surfels where they are needed, and far away, by rays and by
-// the z-buffer by a mesh of squares that stand for them. Throws as above.
+// Squares that stand for a level's surfels, with sides of that many spacings; materials: finishes.
+Mesh discSquares(const SurfelModel& model, const SurfelLevel& level, float side);
+
+// A model of any kind as an asset. One of surfels is drawn by its surfels where they are needed,
+// and far away, by rays and by the z-buffer by a mesh of squares that stand for them. Throws as
+// above.
 ChildRef loadSurfelModel(const std::filesystem::path& path, const std::string& name, Scene& scene,
                          LoadContext& context);
 

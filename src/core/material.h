@@ -4,6 +4,7 @@
 
 #include <core/math.h>
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -83,5 +84,12 @@ struct Material {
                specular_color_map.texture != kNoTexture || emissive_map.texture != kNoTexture;
     }
 };
+
+// Every index into Scene::textures that a material holds, kNoTexture or not.
+inline std::array<int*, 6> textureIndices(Material& m) {
+    return {
+        &m.base_texture,         &m.normal_map.texture,         &m.metallic_roughness_map.texture,
+        &m.specular_map.texture, &m.specular_color_map.texture, &m.emissive_map.texture};
+}
 
 }  // namespace stipple

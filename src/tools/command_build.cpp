@@ -2,6 +2,8 @@
 // `stipple build`: from a scene or model to a prebuilt model.
 #include <core/image.h>
 #include <render/build_model.h>
+#include <scenegraph/io/hybrid.h>
+#include <scenegraph/io/hybrid_file.h>
 #include <scenegraph/io/load.h>
 #include <scenegraph/io/splats.h>
 #include <scenegraph/io/surfel_file.h>
@@ -13,7 +15,8 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <iostream>
+#include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 namespace stipple {
@@ -21,7 +24,7 @@ namespace stipple {
 namespace {
 
 const HelpText kHelp = {
-    "stipple build ASSET --as point-blocks|splats -o MODEL.stipple [--set key=value]...",
+    "stipple build ASSET --as point-blocks|splats|hybrid -o MODEL.stipple [--set key=value]...",
     "Makes a model of points from a model or a scene: points on its surface at several densities, "
     "in blocks that know from where they are seen. Scenes use it like any other model. "
     "point-blocks: rays from 32 directions sample the surface, and as many samples are kept as "
@@ -29,11 +32,169 @@ const HelpText kHelp = {
     "resolution (256), tolerance_angle (25), lattice (triangles|squares), block_size (8), scored "
     "(on|off), partial (on|off), directions (6|32|128). splats: of a point cloud, as few discs as "
     "cover all points within `tolerance` (0.1, per cent of the diagonal) and color_tolerance "
-    "(0.15); neighbours (12), points (200000, taken on meshes), relax (on|off), naive (on|off).",
+    "(0.15); neighbours (12), points (200000, taken on meshes), relax (on|off), naive (on|off). "
+    "hybrid: "
+    "patches of the surface, each as triangles and as surfels, drawn by what costs less in a view: "
+    "phase_one (0.3), phase_two (0.1), clusters (0: by these costs), flat_share (0), largest "
+    "(1000), sampling (3), spacing (0), keep (both|triangles|surfels|flatness), paint "
+    "(source|clusters), tolerance (0.1, of clouds' splats).",
     {"stipple build tree.glb --as point-blocks -o tree.stipple",
      "stipple build bunny.ply --as point-blocks --set resolution=512 -o bunny.stipple",
      "stipple build scan.ply --as splats --set tolerance=0.05 -o scan.stipple",
+     "stipple build bunny.ply --as hybrid -o bunny.stipple",
      "stipple render tree.stipple -o tree.png"}};
+
+using Json = nlohmann::ordered_json;
+
+struct Built {
+    std::string text;  // of the file
+    std::string line;  // what it is, for people
+    Json report;
+};
+
+struct BuildJob {
+    const Scene& scene;
+    ThreadPool& pool;
+    const CancelFlag& cancel;
+    std::function<void(double)> progress;
+    std::string source;  // file name
+};
+
+// A kind of model: its options, and how it is made.
+class ModelKind {
+public:
+    virtual ~ModelKind() = default;
+    virtual void set(const std::string& key, const std::string& value) = 0;
+    virtual Built build(const BuildJob& job) const = 0;
+};
+
+template <class... Values>
+std::string formatted(const char* format, Values... values) {
+    char line[512];
+    std::snprintf(line, sizeof line, format, values...);
+    return line;
+}
+
+Json surfelReport(const SurfelModel& model, size_t bytes) {
+    size_t blocks = 0, surfels = 0;
+    for (const SurfelLevel& level : model.levels)
+        blocks += level.blocks.size(), surfels += level.size();
+    return {{"schema", 1},
+            {"kind", model.kind},
+            {"surfels", model.levels[0].size()},
+            {"blocks", model.levels[0].blocks.size()},
+            {"levels", model.levels.size()},
+            {"surfels_all_levels", surfels},
+            {"blocks_all_levels", blocks},
+            {"bytes", bytes}};
+}
+
+class PointBlocksKind : public ModelKind {
+public:
+    void set(const std::string& key, const std::string& value) override {
+        applyOption(options_, key, value);
+    }
+    Built build(const BuildJob& job) const override {
+        PointBlockReport r;
+        SurfelModel model =
+            buildPointBlockModel(job.scene, options_, job.pool, job.cancel, job.progress, r);
+        model.source = job.source;
+        Built built;
+        built.text = surfelFileText(model);
+        built.report = surfelReport(model, built.text.size());
+        const size_t surfels = built.report["surfels_all_levels"];
+        built.line = formatted(
+            "%zu points in %zu blocks at the finest of %zu levels, %zu points in all; "
+            "%.1f bits a point",
+            model.levels[0].size(), model.levels[0].blocks.size(), model.levels.size(), surfels,
+            8.0 * double(built.text.size()) / double(surfels));
+        built.report.update({{"seconds", r.seconds},
+                             {"rays", r.rays},
+                             {"samples_hit", r.samples_hit},
+                             {"samples_chosen", r.samples_chosen},
+                             {"points_per_pixel", r.per_pixel}});
+        return built;
+    }
+
+private:
+    PointBlockOptions options_;
+};
+
+class SplatsKind : public ModelKind {
+public:
+    void set(const std::string& key, const std::string& value) override {
+        applyOption(options_, key, value);
+    }
+    Built build(const BuildJob& job) const override {
+        SplatReport r;
+        SurfelModel model = buildSplats(job.scene, options_, job.pool, job.cancel, job.progress, r);
+        model.source = job.source;
+        Built built;
+        built.text = surfelFileText(model);
+        built.report = surfelReport(model, built.text.size());
+        built.line = formatted(
+            "%llu points, %llu splats; points lie within %.3g m of them, %.3g m on average",
+            static_cast<unsigned long long>(r.points), static_cast<unsigned long long>(r.splats),
+            r.largest_distance, r.mean_distance);
+        built.report.update({{"seconds", r.seconds},
+                             {"points", r.points},
+                             {"tolerance", r.tolerance},
+                             {"largest_distance", r.largest_distance},
+                             {"mean_distance", r.mean_distance}});
+        return built;
+    }
+
+private:
+    SplatOptions options_;
+};
+
+class HybridKind : public ModelKind {
+public:
+    void set(const std::string& key, const std::string& value) override {
+        applyOption(options_, key, value);
+    }
+    Built build(const BuildJob& job) const override {
+        HybridReport r;
+        HybridModel model = buildHybrid(job.scene, options_, job.pool, job.cancel, job.progress, r);
+        model.source = job.source;
+        Built built;
+        built.text = hybridFileText(model);
+        built.line = formatted(
+            "%llu triangles in %u clusters (%.0f %% in flat ones), %u patches; %llu surfels, %llu "
+            "in all levels",
+            static_cast<unsigned long long>(r.triangles), r.clusters, 100.0 * r.flat_share,
+            r.patches, static_cast<unsigned long long>(r.surfels),
+            static_cast<unsigned long long>(r.surfels_all_levels));
+        built.report = {{"schema", 1},
+                        {"kind", "hybrid"},
+                        {"triangles", r.triangles},
+                        {"triangles_all_levels", r.triangles_all_levels},
+                        {"surfels", r.surfels},
+                        {"surfels_all_levels", r.surfels_all_levels},
+                        {"clusters_phase_one", r.clusters_phase_one},
+                        {"clusters", r.clusters},
+                        {"flat_clusters", r.flat_clusters},
+                        {"flat_share", r.flat_share},
+                        {"patches", r.patches},
+                        {"bytes", built.text.size()},
+                        {"seconds", r.seconds},
+                        {"cluster_seconds", r.cluster_seconds},
+                        {"sample_seconds", r.sample_seconds},
+                        {"simplify_seconds", r.simplify_seconds}};
+        return built;
+    }
+
+private:
+    HybridOptions options_;
+};
+
+std::unique_ptr<ModelKind> makeKind(const std::string& name) {
+    if (name == "point-blocks") return std::make_unique<PointBlocksKind>();
+    if (name == "splats") return std::make_unique<SplatsKind>();
+    if (name == "hybrid") return std::make_unique<HybridKind>();
+    throw Error(ErrorCode::kInvalidArgument, "--as",
+                "'" + name + "' is not point-blocks, splats or hybrid");
+}
 
 }  // namespace
 
@@ -47,7 +208,7 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
     app.add_option("ASSET", input, "*.scene.json, .gltf, .glb, .ply or .obj")
         ->required()
         ->group("Arguments");
-    app.add_option("--as", kind, "the kind of model: point-blocks or splats")
+    app.add_option("--as", kind, "the kind of model: point-blocks, splats or hybrid")
         ->required()
         ->type_name("KIND")
         ->group("Model");
@@ -74,20 +235,14 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
         ->group("Running");
     app.add_flag("-q,--quiet", quiet, "no progress, only warnings and errors")->group("Running");
     if (!parseArguments(app, kHelp, arguments)) return ExitCode::kDone;
-    const bool as_splats = kind == "splats";
-    if (kind != "point-blocks" && !as_splats)
-        throw Error(ErrorCode::kInvalidArgument, "--as",
-                    "'" + kind + "' is not point-blocks or splats");
+    const std::unique_ptr<ModelKind> model_kind = makeKind(kind);
     checkOutputFile("-o", output, {".stipple"});
     if (!json.empty()) checkOutputFile("--json", json, {});
-    PointBlockOptions block_options;
-    SplatOptions splat_options;
     for (const std::string& set : sets) {
         const size_t equals = set.find('=');
         if (equals == std::string::npos)
             throw Error(ErrorCode::kInvalidArgument, "--set", "'" + set + "' is not KEY=VALUE");
-        const std::string key = set.substr(0, equals), value = set.substr(equals + 1);
-        as_splats ? applyOption(splat_options, key, value) : applyOption(block_options, key, value);
+        model_kind->set(set.substr(0, equals), set.substr(equals + 1));
     }
 
     const CancelFlag& cancel = cancelOnSignals();
@@ -101,60 +256,20 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
     progress.finish();
     for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
 
-    PointBlockReport blocks_report;
-    SplatReport splats_report;
-    const auto onProgress = [&](double fraction) { progress.update("build", fraction); };
-    SurfelModel model;
+    Built built;
     try {
-        model = as_splats
-                    ? buildSplats(scene, splat_options, pool, cancel, onProgress, splats_report)
-                    : buildPointBlockModel(scene, block_options, pool, cancel, onProgress,
-                                           blocks_report);
+        built = model_kind->build({scene, pool, cancel,
+                                   [&](double fraction) { progress.update("build", fraction); },
+                                   std::filesystem::path(input).filename().string()});
     } catch (const Error& error) {
         if (error.where().empty() && error.code() == ErrorCode::kInvalidArgument)
             throw Error(ErrorCode::kInvalidScene, input, error.what());
         throw;
     }
-    model.source = std::filesystem::path(input).filename().string();
-    const std::string text = surfelFileText(model);
-    saveFile(output, text);
+    saveFile(output, built.text);
     progress.finish();
-    size_t blocks = 0, surfels = 0;
-    for (const SurfelLevel& level : model.levels)
-        blocks += level.blocks.size(), surfels += level.size();
-    nlohmann::ordered_json result = {{"schema", 1},
-                                     {"kind", model.kind},
-                                     {"surfels", model.levels[0].size()},
-                                     {"blocks", model.levels[0].blocks.size()},
-                                     {"levels", model.levels.size()},
-                                     {"surfels_all_levels", surfels},
-                                     {"blocks_all_levels", blocks},
-                                     {"bytes", text.size()}};
-    if (as_splats) {
-        const SplatReport& r = splats_report;
-        std::printf(
-            "%s: %llu points, %llu splats; points lie within %.3g m of them, %.3g m on average\n",
-            output.c_str(), static_cast<unsigned long long>(r.points),
-            static_cast<unsigned long long>(r.splats), r.largest_distance, r.mean_distance);
-        result.update({{"seconds", r.seconds},
-                       {"points", r.points},
-                       {"tolerance", r.tolerance},
-                       {"largest_distance", r.largest_distance},
-                       {"mean_distance", r.mean_distance}});
-    } else {
-        const PointBlockReport& r = blocks_report;
-        std::printf(
-            "%s: %zu points in %zu blocks at the finest of %zu levels, %zu points in all; "
-            "%.1f bits a point\n",
-            output.c_str(), model.levels[0].size(), model.levels[0].blocks.size(),
-            model.levels.size(), surfels, 8.0 * double(text.size()) / double(surfels));
-        result.update({{"seconds", r.seconds},
-                       {"rays", r.rays},
-                       {"samples_hit", r.samples_hit},
-                       {"samples_chosen", r.samples_chosen},
-                       {"points_per_pixel", r.per_pixel}});
-    }
-    if (!json.empty()) saveFile(json, result.dump(2) + "\n");
+    std::printf("%s: %s\n", output.c_str(), built.line.c_str());
+    if (!json.empty()) saveFile(json, built.report.dump(2) + "\n");
     return ExitCode::kDone;
 }
 

@@ -54,6 +54,7 @@ Json infoJson(const Scene& scene, const std::vector<std::string>& warnings) {
     const std::vector<double> shown = meshInstances(scene);
     for (size_t i = 0; i < scene.meshes.size(); ++i) {
         const Mesh& mesh = scene.meshes[i];
+        if (mesh.is_patch) continue;
         json["assets"].push_back({{"name", mesh.name},
                                   {"triangles", mesh.triangles.size()},
                                   {"instances", jsonCount(shown[i])},

@@ -896,6 +896,37 @@ JSON
     expect_ok render many.scene.json -o many.png "${tiny[@]}"
 }
 
+case_build_hybrid() {
+    write_scene
+    expect_ok build scene.scene.json --as hybrid -o ball.stipple --json built.json
+    expect_stdout '[0-9]+ triangles in [0-9]+ clusters \([0-9]+ % in flat ones\), [0-9]+ patches; [0-9]+ surfels'
+    grep -q '"cluster_seconds"' built.json || fail "no report"
+    expect_ok render ball.stipple -o ball.png "${tiny[@]}"
+    expect_ok render scene.scene.json -o source.png "${tiny[@]}"
+    expect_ok info ball.stipple
+    # As an asset of a scene, instanced, with every reconstruction and by rays.
+    cat >many.scene.json <<JSON
+{ "version": 1, "assets": { "ball": { "file": "ball.stipple" } }, "root": "many",
+  "groups": { "many": { "grid": { "child": "ball", "count_x": 3, "count_z": 3, "spacing_x": 2, "spacing_z": 2 } } } }
+JSON
+    for reconstruct in per-pixel splat gaussian pull-push ewa; do
+        expect_ok render many.scene.json -o many.png "${tiny[@]}" --reconstruct "$reconstruct"
+    done
+    expect_ok render many.scene.json -o rays.png "${tiny[@]}" --method raycast
+    # A hybrid of hybrids.
+    expect_ok build many.scene.json --as hybrid -o many.stipple --set keep=flatness --set flat_share=0.5
+    expect_ok render many.stipple -o again.png "${tiny[@]}"
+    expect_ok build scene.scene.json --as hybrid -o clusters.stipple --set paint=clusters --set clusters=12
+    expect_error 2 "'phase'" build scene.scene.json --as hybrid -o a.stipple --set phase=1
+    expect_error 2 'phase_one' build scene.scene.json --as hybrid -o a.stipple --set phase_one=11
+    expect_error 2 'both' build scene.scene.json --as hybrid -o a.stipple --set keep=none
+    expect_error 2 'coarser' build scene.scene.json --as hybrid -o a.stipple --set spacing=0.001
+    head -c 2000 ball.stipple >cut.stipple
+    expect_error 3 'cut\.stipple: ' render cut.stipple -o a.png
+    printf '\x09' | dd of=ball.stipple bs=1 seek=8 conv=notrunc status=none
+    expect_error 3 'has version 9; this program reads 1 and 2' render ball.stipple -o a.png
+}
+
 case_build_errors() {
     write_scene
     expect_ok build scene.scene.json --as splats -o splats.stipple --set points=2000
