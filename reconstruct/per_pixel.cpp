@@ -19,7 +19,7 @@ struct Behind {
     explicit Behind(const View& view) {
         if (!view.orthographic) return;
         scale = 1.0f;
-        offset = 4.0f / float(view.focal);
+        offset = 16.0f / float(view.focal);
     }
     float of(float depth) const { return depth * scale + offset; }
 };
