@@ -58,7 +58,8 @@ using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<fl
                                                  3, uint32_t>;
 
 constexpr uint32_t kNobody = 0xffffffffu;
-constexpr size_t kFirstLook = 64;  // neighbours
+constexpr size_t kFirstLook = 64;      // neighbours
+constexpr size_t kMostCovered = 1024;  // points, about: flat places would take n^2 time
 
 class SplatBuilder {
 public:
@@ -339,35 +340,32 @@ private:
     }
 
     // A point's splat grows over its neighbours, in order of distance, until one is not accepted.
-    // False if `most` of them did not suffice to meet one.
+    // False if about `most` of them did not suffice to meet one.
     bool grow(uint32_t i, size_t most) {
         const CloudPoint& center = cloud_.points[i];
-        std::vector<uint32_t> near;
-        std::vector<float> squared;
+        std::vector<std::pair<uint32_t, float>> near;
         std::vector<std::pair<float, uint32_t>> order;
-        for (size_t wanted = 16;; wanted *= 4) {
-            wanted = std::min({wanted, most, cloud_.points.size()});
-            near.resize(wanted);
-            squared.resize(wanted);
-            const size_t n =
-                tree_->knnSearch(&center.position.x, wanted, near.data(), squared.data());
+        // Twice the spacing holds a dozen points of a surface.
+        for (float known = 2.0f * std::max(spacing_[i], 1e-15f);; known *= 2.0f) {
+            tree_->radiusSearch(&center.position.x, known * known, near,
+                                nanoflann::SearchParams(32, 0.0f, false));
             order.clear();
-            for (size_t k = 0; k < n; ++k)
-                order.emplace_back(distanceInPlane(center, cloud_.points[near[k]]), near[k]);
+            for (const auto& [k, squared] : near)
+                order.emplace_back(distanceInPlane(center, cloud_.points[k]), k);
             std::sort(order.begin(), order.end());
-            // Beyond what was looked at, nothing is known.
-            const float known = std::sqrt(squared[n - 1]);
-            bool is_ended = n == cloud_.points.size();
+            const bool are_all = near.size() == cloud_.points.size();
+            bool is_ended = are_all;
             radius_[i] = 0.0f;
             for (const auto& [distance, k] : order) {
                 if (!accepts(center, cloud_.points[k])) {
                     is_ended = true;
                     break;
                 }
-                if (distance > known - tolerance_ && n < cloud_.points.size()) break;
+                // Beyond what was looked at, nothing is known.
+                if (distance > known - tolerance_ && !are_all) break;
                 radius_[i] = distance;
             }
-            if (is_ended || n >= most) return is_ended;
+            if (is_ended || near.size() >= most) return is_ended;
         }
     }
 
@@ -388,7 +386,7 @@ private:
     }
 
     // Greedy: of the points that none covers yet, the one whose splat covers the most of them. Only
-    // what may be chosen is grown to its end, without limit.
+    // what may be chosen is grown to its end, or until it covers kMostCovered.
     void choose() {
         const size_t n = cloud_.points.size();
         if (options_.naive) {
@@ -421,7 +419,7 @@ private:
             queue.pop();
             if (is_covered[c.index]) continue;
             if (!is_grown_[c.index]) {
-                grow(c.index, n);
+                grow(c.index, kMostCovered);
                 is_grown_[c.index] = 1;
             }
             covered(c.index, points);
