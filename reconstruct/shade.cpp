@@ -139,8 +139,37 @@ Vec3 skyRadiance(const Sky& sky, const Vec3& direction) {
     return glm::mix(sky.horizon, sky.zenith, std::sqrt(direction.y));
 }
 
-Vec3 shade(const SurfaceSample& sample, const Material& material, const Lighting& lighting,
+namespace {
+
+// The sample under the pictures that projectors throw on it, one after the other.
+SurfaceSample underProjectors(SurfaceSample sample, const Material& material,
+                              const Lighting& lighting, const View& view,
+                              const LightVisibility* lights) {
+    const DMat3 world_from_camera = glm::transpose(view.camera_from_world);
+    const DVec3 place = view.eye_world + world_from_camera * DVec3(sample.position_camera);
+    const Vec3 to_eye =
+        view.orthographic ? -Vec3(world_from_camera[2]) : Vec3(view.eye_world - place);
+    Vec3 n = sample.normal_world;
+    if (material.double_sided && glm::dot(n, to_eye) < 0.0f) n = -n;
+    const float width =
+        sample.extent * (view.orthographic ? 1.0f : sample.depth) / float(view.focal);
+    for (size_t i = 0; i < lighting.projectors.size(); ++i) {
+        const Projector& projector = lighting.projectors[i];
+        if (!isInBeam(projector, place, n)) continue;
+        const float lit = lights ? lights->ofLamp(lighting.points.size() + i, sample) : 1.0f;
+        sample.albedo = projectedColor(projector, sample.albedo, place, n, width, lit);
+    }
+    return sample;
+}
+
+}  // namespace
+
+Vec3 shade(const SurfaceSample& found, const Material& material, const Lighting& lighting,
            const View& view, const LightVisibility* lights, const AmbientVisibility* ambient) {
+    SurfaceSample projected;
+    if (!lighting.projectors.empty())
+        projected = underProjectors(found, material, lighting, view, lights);
+    const SurfaceSample& sample = lighting.projectors.empty() ? found : projected;
     if (material.unlit) return sample.albedo;
     const Vec3 to_eye_camera =
         view.orthographic ? Vec3(0.0f, 0.0f, -1.0f) : -sample.position_camera;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shading of one surface sample: Lambert (two-sided where the material is), translucency, a
-// microfacet lobe, suns, point and spot lights, and a sky or an environment. Done per sample
-// (subpixel, point or ray) before samples are averaged into pixels, the same for every method.
-// Based on: Khronos. glTF 2.0 Specification. 2021 (appendix B: BRDF Implementation).
+// Shading of one surface sample: projected pictures, Lambert (two-sided where the material is),
+// translucency, a microfacet lobe, suns, point and spot lights, and a sky or an environment. Done
+// per sample (subpixel, point or ray) before samples are averaged into pixels, the same for every
+// method. Based on: Khronos. glTF 2.0 Specification. 2021 (appendix B: BRDF Implementation).
 #pragma once
 
 #include <core/ambient_visibility.h>

@@ -33,7 +33,8 @@ bool SubpixelShader::showAll(const SampleLookup& lookup, const Cell& cell, int f
                              uint32_t members) {
     const uint32_t number = cell.number[first];
     if (members == uint32_t(1) << first || context_.light_visibility ||
-        context_.ambient_visibility || number == varied_number_)
+        context_.ambient_visibility || !context_.lighting->projectors.empty() ||
+        number == varied_number_)
         return false;
     // Of a plane 1 / depth (orthographic: depth) is affine in the picture.
     const bool orthographic = context_.view.orthographic;

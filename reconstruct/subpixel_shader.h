@@ -20,9 +20,9 @@ public:
     void show(const SampleLookup& lookup, uint64_t key, int x, int y);
     // Calls take(x, y, key) for all subpixels of pixel (px, py) after surface and radiance have
     // been set, where the key is not empty: once for all that show the same point or triangle, seen
-    // in their middle. Once for each where shadows or occlusion may fall between them or the normal
-    // varies: what is mirrored does not average as normals do. Within cells of kSharedCells^2
-    // subpixels.
+    // in their middle. Once for each where shadows, occlusion or pictures may fall between them or
+    // the normal varies: what is mirrored does not average as normals do. Within cells of
+    // kSharedCells^2 subpixels.
     template <class Take>
     void showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
                    const Take& take);

@@ -84,8 +84,8 @@ std::string encodePng(const Texture::Level& level) {
     return std::string(bytes.begin(), bytes.end());
 }
 
-int addTexture(Scene& scene, const std::filesystem::path& file, bool is_srgb, bool is_opaque,
-               LoadContext& context, const std::string& where) {
+Texture readTexture(const std::filesystem::path& file, bool is_srgb, bool is_opaque,
+                    LoadContext& context, const std::string& where) {
     Texture texture;
     texture.name = oneLine(file.filename().string());
     texture.srgb = is_srgb;
@@ -97,7 +97,12 @@ int addTexture(Scene& scene, const std::filesystem::path& file, bool is_srgb, bo
         for (size_t i = 3; i < rgba.size(); i += 4) rgba[i] = 255;
     }
     buildMipmaps(texture);
-    scene.textures.push_back(std::move(texture));
+    return texture;
+}
+
+int addTexture(Scene& scene, const std::filesystem::path& file, bool is_srgb, bool is_opaque,
+               LoadContext& context, const std::string& where) {
+    scene.textures.push_back(readTexture(file, is_srgb, is_opaque, context, where));
     return int(scene.textures.size()) - 1;
 }
 

@@ -17,8 +17,11 @@ Texture::Level decodePicture(const std::string& bytes, const MemoryBudget& budge
 // The picture as the bytes of a PNG file. Throws kInternal if it cannot be encoded.
 std::string encodePng(const Texture::Level& level);
 
-// Reads the picture file into a new texture of the scene, with mip levels, and returns its
-// index. is_opaque: its alpha has no meaning. Throws as above, and as readFile().
+// Reads a picture file as a texture with mip levels. is_opaque: its alpha has no meaning. Throws as
+// above, and as readFile().
+Texture readTexture(const std::filesystem::path& file, bool is_srgb, bool is_opaque,
+                    LoadContext& context, const std::string& where);
+// The same into a new texture of the scene, whose index it returns.
 int addTexture(Scene& scene, const std::filesystem::path& file, bool is_srgb, bool is_opaque,
                LoadContext& context, const std::string& where);
 

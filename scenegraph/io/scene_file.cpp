@@ -3,6 +3,7 @@
 
 #include <core/nearest_name.h>
 #include <core/settings.h>
+#include <scenegraph/io/picture.h>
 #include <scenegraph/io/scene_reader.h>
 #include <scenegraph/io/schemas.h>
 
@@ -39,6 +40,25 @@ void readCameras(SceneReader& reader, const Json& cameras) {
         const std::string& name = reader.scene.cameras.back().name;
         if (!names.insert(name).second)
             reader.fail(path, "a camera before has the name " + inQuotes(name) + " too");
+    }
+}
+
+void readProjectors(SceneReader& reader, const Json& projectors) {
+    for (size_t i = 0; i < projectors.size(); ++i) {
+        const Json& source = projectors[i];
+        const JsonPath path = {"projectors", std::to_string(i)};
+        const JsonPath picture_path = joined(path, {"picture"});
+        const Camera camera = readCamera(reader, source, path);
+        Projector& projector = reader.scene.lighting.projectors.emplace_back();
+        projector.name = camera.name;
+        Texture picture = readTexture(reader.file(source["picture"], picture_path), true, false,
+                                      reader.context, reader.where(picture_path));
+        picture.wrap_u = picture.wrap_v = Wrap::kClamp;
+        projector.view = makeView(camera, picture.levels[0].width, picture.levels[0].height, 1);
+        projector.picture = std::make_shared<const Texture>(std::move(picture));
+        std::string mode = "replace";
+        readMember(source, "mode", mode);
+        projector.mode = mode == "replace" ? ProjectorMode::kReplace : ProjectorMode::kModulate;
     }
 }
 
@@ -298,6 +318,7 @@ Scene readSceneFile(const std::filesystem::path& path, const std::string& name,
     reader.scene.root =
         root_child.isGroup() ? root_child.index() : uint32_t(reader.scene.groups.size() - 1);
     readLighting(reader, root);
+    if (root.contains("projectors")) readProjectors(reader, root["projectors"]);
     if (root.contains("cameras")) readCameras(reader, root["cameras"]);
     if (root.contains("paths")) readPaths(reader, root["paths"]);
     if (root.contains("render")) readRenderDefaults(reader, root["render"]);

@@ -112,4 +112,21 @@ Vec3 environmentAmbient(const Environment& e, const Vec3& normal_world) {
     return glm::max(sum, Vec3(0.0f));
 }
 
+std::vector<PointLight> lampsOf(const Lighting& lighting) {
+    std::vector<PointLight> lamps = lighting.points;
+    for (const Projector& projector : lighting.projectors) {
+        const View& view = projector.view;
+        PointLight& lamp = lamps.emplace_back();
+        lamp.position = view.eye_world;
+        lamp.intensity = Vec3(1e30f);  // however far: it is no light that fades
+        lamp.is_spot = true;
+        lamp.axis = Vec3(glm::transpose(view.camera_from_world)[2]);
+        const double across = std::hypot(view.width, view.height);
+        lamp.outer_cone =
+            std::min(float(std::atan(0.5 * across / view.focal)) + 0.01f, float(0.5 * kPi));
+        lamp.inner_cone = 0.999f * lamp.outer_cone;
+    }
+    return lamps;
+}
+
 }  // namespace stipple

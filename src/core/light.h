@@ -4,6 +4,7 @@
 #pragma once
 
 #include <core/math.h>
+#include <core/projector.h>
 
 #include <array>
 #include <memory>
@@ -76,8 +77,13 @@ struct Sky {
 struct Lighting {
     std::vector<Sun> suns;
     std::vector<PointLight> points;
+    std::vector<Projector> projectors;
     Sky sky;
     float exposure = 0.0f;  // stops
 };
+
+// What casts shadows from a place: the point lights, then a spot light around each projector's
+// beam.
+std::vector<PointLight> lampsOf(const Lighting& lighting);
 
 }  // namespace stipple

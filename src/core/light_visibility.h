@@ -14,7 +14,7 @@ public:
     virtual ~LightVisibility() = default;
     // Share of the light of Lighting::suns[sun] that reaches the sample, 0 to 1. Thread-safe.
     virtual float ofSun(size_t sun, const SurfaceSample& sample) const = 0;
-    // Of Lighting::points[lamp].
+    // Of lampsOf(lighting)[lamp].
     virtual float ofLamp(size_t lamp, const SurfaceSample& sample) const = 0;
 };
 

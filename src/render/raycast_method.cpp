@@ -34,7 +34,8 @@ public:
         : caster_(caster),
           lighting_(lighting),
           eye_world_(eye_world),
-          n_lights_(lighting.suns.size() + lighting.points.size()) {}
+          lamps_(lampsOf(lighting)),
+          n_lights_(lighting.suns.size() + lamps_.size()) {}
 
     // For the hits of `rays`.
     void cast(const std::vector<Ray>& rays, const std::vector<RayHit>& hits) {
@@ -69,7 +70,7 @@ private:
         if (light < lighting_.suns.size()) {
             direction = lighting_.suns[light].direction_to_light;
         } else {
-            const PointLight& lamp = lighting_.points[light - lighting_.suns.size()];
+            const PointLight& lamp = lamps_[light - lighting_.suns.size()];
             const Vec3 to_lamp = Vec3(lamp.position - eye_world_) - p;
             if (incidentLight(lamp, to_lamp) == Vec3(0.0f)) return false;
             const float distance = glm::length(to_lamp);
@@ -86,6 +87,7 @@ private:
     const RayCaster& caster_;
     const Lighting& lighting_;
     DVec3 eye_world_;
+    const std::vector<PointLight> lamps_;
     size_t n_lights_;
     std::vector<Ray> to_light_;
     std::vector<size_t> ray_of_;

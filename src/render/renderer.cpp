@@ -61,7 +61,7 @@ struct Renderer::Impl {
     Visibility makeVisibility(const FrameRequest& request, const View& view, FrameStats& stats) {
         Visibility visibility;
         const bool has_shadows = request.settings.shadows &&
-                                 (!scene.lighting.suns.empty() || !scene.lighting.points.empty());
+                                 (!scene.lighting.suns.empty() || !lampsOf(scene.lighting).empty());
         if (!has_shadows && !request.settings.ao) return visibility;
         const RasterizeLarge rasterize = [&](const View& v, const FramePlan& plan) {
             return rasterizePlan(v, plan);

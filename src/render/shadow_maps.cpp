@@ -154,7 +154,8 @@ public:
         std::vector<ShadowMap> suns;
         for (const Sun& sun : scene_.lighting.suns) suns.push_back(drawSun(sun, look));
         std::vector<LampShadow> lamps;
-        for (const PointLight& lamp : scene_.lighting.points) lamps.push_back(drawLamp(lamp, look));
+        for (const PointLight& lamp : lampsOf(scene_.lighting))
+            lamps.push_back(drawLamp(lamp, look));
         stats.shadow_points += drawn_.points_drawn;
         return std::make_unique<ShadowPages>(view_, settings_.shadow_texel, std::move(suns),
                                              std::move(lamps));
