@@ -230,8 +230,10 @@ GeneratedMesh heightMapTerrain(SceneReader& reader, const std::string& name, con
     material.name = "ground";
     material.base_color = Vec3(1.0f);
     const JsonPath texture_path = joined(path, {"texture"});
-    material.base_texture = addTexture(reader.scene, reader.file(source["texture"], texture_path),
-                                       true, false, reader.context, reader.where(texture_path));
+    material.base_texture = addTexture(
+        reader.scene, reader.file(source["texture"], texture_path), true, false, reader.context,
+        reader.where(texture_path) + ": " +
+            inQuotes(source["texture"].get_ref<const std::string&>()));
     Texture& texture = reader.scene.textures[size_t(material.base_texture)];
     texture.wrap_u = texture.wrap_v = Wrap::kClamp;
     return terrain;

@@ -51,8 +51,10 @@ void readProjectors(SceneReader& reader, const Json& projectors) {
         const Camera camera = readCamera(reader, source, path);
         Projector& projector = reader.scene.lighting.projectors.emplace_back();
         projector.name = camera.name;
-        Texture picture = readTexture(reader.file(source["picture"], picture_path), true, false,
-                                      reader.context, reader.where(picture_path));
+        Texture picture =
+            readTexture(reader.file(source["picture"], picture_path), true, false, reader.context,
+                        reader.where(picture_path) + ": " +
+                            inQuotes(source["picture"].get_ref<const std::string&>()));
         picture.wrap_u = picture.wrap_v = Wrap::kClamp;
         projector.view = makeView(camera, picture.levels[0].width, picture.levels[0].height, 1);
         projector.picture = std::make_shared<const Texture>(std::move(picture));

@@ -170,6 +170,19 @@ case_schema_violation() {
     expect_error 3 'colour' info scene.scene.json
 }
 
+case_bad_projectors() {
+    local projector='"name": "p", "eye": [0, 0, 5], "target": [0, 0, 0]'
+    write_scene '"projectors": [{ '"$projector"' }],'
+    expect_error 3 '/projectors/0: .*picture' info scene.scene.json
+    write_scene '"projectors": [{ '"$projector"', "picture": "none.png" }],'
+    expect_error 3 'scene\.scene\.json: /projectors/0/picture: .*none\.png' info scene.scene.json
+    echo "no picture" > bad.png
+    write_scene '"projectors": [{ '"$projector"', "picture": "bad.png" }],'
+    expect_error 3 'bad\.png' info scene.scene.json
+    write_scene '"projectors": [{ "name": "p", "eye": [0, 0, 5], "target": [0, 0, 5], "picture": "bad.png" }],'
+    expect_error 3 '/projectors/0/target: ' info scene.scene.json
+}
+
 case_unknown_asset() {
     write_scene '"groups": { "all": { "instances": [ { "child": "bell" } ] } },'
     sed -i 's/"root": "ball"/"root": "all"/' scene.scene.json
