@@ -29,13 +29,29 @@ void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y
     last_number_ = number;
 }
 
-bool SubpixelShader::showAll(const SampleLookup& lookup, const Cell& cell, int first,
-                             uint32_t members) {
-    const uint32_t number = cell.number[first];
-    if (members == uint32_t(1) << first || context_.light_visibility ||
-        context_.ambient_visibility || !context_.lighting->projectors.empty() ||
-        number == varied_number_)
-        return false;
+bool SubpixelShader::hasVariedLight() const {
+    return context_.light_visibility || context_.ambient_visibility ||
+           !context_.lighting->projectors.empty();
+}
+
+uint32_t SubpixelShader::membersBeside(const Cell& cell, uint32_t members) const {
+    const int side = std::min(kSharedCells, context_.view.subpixels) / 2;
+    const int first = std::countr_zero(members);
+    if (side < 2) return uint32_t(1) << first;
+    uint32_t beside = 0;
+    for (uint32_t m = members; m; m &= m - 1) {
+        const int i = std::countr_zero(m);
+        const bool is_beside =
+            (cell.x[i] - cell.x[0]) / side == (cell.x[first] - cell.x[0]) / side &&
+            (cell.y[i] - cell.y[0]) / side == (cell.y[first] - cell.y[0]) / side;
+        beside |= uint32_t(is_beside) << i;
+    }
+    return beside;
+}
+
+bool SubpixelShader::showMembers(const SampleLookup& lookup, const Cell& cell, uint32_t members) {
+    const int first = std::countr_zero(members);
+    if (members == uint32_t(1) << first || cell.number[first] == varied_number_) return false;
     // Of a plane 1 / depth (orthographic: depth) is affine in the picture.
     const bool orthographic = context_.view.orthographic;
     float x = 0.0f, y = 0.0f, q = 0.0f;
@@ -51,10 +67,10 @@ bool SubpixelShader::showAll(const SampleLookup& lookup, const Cell& cell, int f
     Vec3 origin, direction;
     context_.view.ray(at.x, at.y, origin, direction);
     sample_.extent = std::sqrt(n);
-    showPoint(lookup, origin + direction * depth, number, at);
+    showPoint(lookup, origin + direction * depth, cell.number[first], at);
     sample_.extent = 1.0f;
     if ((*context_.materials)[sample_.material].normal_map.texture == kNoTexture) return true;
-    varied_number_ = number;
+    varied_number_ = cell.number[first];
     return false;
 }
 

@@ -20,9 +20,9 @@ public:
     void show(const SampleLookup& lookup, uint64_t key, int x, int y);
     // Calls take(x, y, key) for all subpixels of pixel (px, py) after surface and radiance have
     // been set, where the key is not empty: once for all that show the same point or triangle, seen
-    // in their middle. Once for each where shadows, occlusion or pictures may fall between them or
-    // the normal varies: what is mirrored does not average as normals do. Within cells of
-    // kSharedCells^2 subpixels.
+    // in their middle, within cells of kSharedCells^2 subpixels; where shadows, occlusion or
+    // pictures may fall between them, within cells half as wide, and no wider than half a pixel.
+    // Once for each where the normal varies: what is mirrored does not average as normals do.
     template <class Take>
     void showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
                    const Take& take);
@@ -39,8 +39,12 @@ private:
     struct Cell;
     template <class Take>
     void showCell(const SampleLookup& lookup, const Cell& cell, const Take& take);
-    // False if members of a cell are not alike.
-    bool showAll(const SampleLookup& lookup, const Cell& cell, int first, uint32_t members);
+    // Those of the members' cells half as wide that the first of them is in.
+    uint32_t membersBeside(const Cell& cell, uint32_t members) const;
+    // Whether light may fall between members.
+    bool hasVariedLight() const;
+    // Surface and radiance in the middle of some members of a cell. False where their normals vary.
+    bool showMembers(const SampleLookup& lookup, const Cell& cell, uint32_t members);
 
     const ReconstructionContext& context_;
     uint32_t last_number_ = kNoNumber;
@@ -89,11 +93,16 @@ void SubpixelShader::showCell(const SampleLookup& lookup, const Cell& cell, cons
         const uint32_t number = cell.number[first];
         uint32_t members = 0;
         for (int i = first; i < cell.count; ++i) members |= uint32_t(cell.number[i] == number) << i;
+        if (number != kNoNumber) {
+            if (hasVariedLight()) members = membersBeside(cell, members);
+            if (!showMembers(lookup, cell, members)) {
+                members = uint32_t(1) << first;
+                show(lookup, cell.key[first], cell.x[first], cell.y[first]);
+            }
+        }
         left &= ~members;
-        const bool is_shared = number != kNoNumber && showAll(lookup, cell, first, members);
         for (; members; members &= members - 1) {
             const int i = std::countr_zero(members);
-            if (number != kNoNumber && !is_shared) show(lookup, cell.key[i], cell.x[i], cell.y[i]);
             take(cell.x[i], cell.y[i], cell.key[i]);
         }
     }
