@@ -15,8 +15,6 @@ constexpr uint32_t kMostResidents = 32;  // of a leaf, before it is split
 constexpr uint32_t kFewInstances = 12;   // below a node whose children are leaves: merged
 constexpr size_t kMostChanges = 1 << 16;
 
-uint64_t useKey(uint32_t child, uint32_t holder) { return uint64_t(child) << 32 | holder; }
-
 uint32_t placesOf(const GroupNode& node) { return node.resident_count + node.free_count; }
 
 uint32_t capacityFor(uint32_t count) { return std::bit_ceil(std::max(count, 4u)); }
@@ -38,6 +36,7 @@ std::string freeName(const Scene& scene, const std::string& name) {
 SceneEditor::SceneEditor(Scene& scene) : scene_(scene) {
     open_.resize(scene.groups.size());
     uses_.resize(scene.groups.size());
+    holders_.resize(scene.groups.size());
     for (uint32_t g = 0; g < scene.groups.size(); ++g) {
         const Group& group = scene.groups[g];
         for (uint32_t i = 0; i < group.instances.size(); ++i) {
@@ -51,7 +50,7 @@ void SceneEditor::addUse(InstanceId place, ChildRef child) {
     if (!child.isGroup()) return;
     Uses& uses = uses_[child.index()];
     if (++uses.count <= kFewUses) uses.places.push_back(place);
-    ++child_uses_[useKey(child.index(), place.group)];
+    ++holders_[child.index()][place.group];
 }
 
 void SceneEditor::removeUse(InstanceId place, ChildRef child) {
@@ -59,8 +58,9 @@ void SceneEditor::removeUse(InstanceId place, ChildRef child) {
     Uses& uses = uses_[child.index()];
     --uses.count;
     std::erase(uses.places, place);
-    const auto found = child_uses_.find(useKey(child.index(), place.group));
-    if (--found->second == 0) child_uses_.erase(found);
+    std::map<uint32_t, size_t>& holders = holders_[child.index()];
+    const auto found = holders.find(place.group);
+    if (--found->second == 0) holders.erase(found);
 }
 
 SceneEditor::OpenGroup& SceneEditor::opened(uint32_t index) {
@@ -111,21 +111,24 @@ Affine SceneEditor::groupFromChild(InstanceId id) {
     return scene_.groups[id.group].instances.groupFromChild(slot);
 }
 
-bool SceneEditor::reaches(ChildRef from, uint32_t group) const {
-    if (!from.isGroup()) return false;
-    std::vector<uint32_t> stack{from.index()};
+// The groups, each once, and all that hold them.
+std::vector<uint32_t> SceneEditor::withHolders(std::vector<uint32_t> groups) const {
     std::vector<bool> seen(scene_.groups.size(), false);
-    while (!stack.empty()) {
-        const uint32_t g = stack.back();
-        stack.pop_back();
-        if (g == group) return true;
+    std::vector<uint32_t> result;
+    while (!groups.empty()) {
+        const uint32_t g = groups.back();
+        groups.pop_back();
         if (seen[g]) continue;
         seen[g] = true;
-        for (const auto& [key, count] : child_uses_) {
-            if (uint32_t(key) == g) stack.push_back(uint32_t(key >> 32));
-        }
+        result.push_back(g);
+        for (const auto& [holder, count] : holders_[g]) groups.push_back(holder);
     }
-    return false;
+    return result;
+}
+
+bool SceneEditor::reaches(ChildRef from, uint32_t group) const {
+    const std::vector<uint32_t> around = withHolders({group});
+    return std::find(around.begin(), around.end(), from.index()) != around.end();
 }
 
 void SceneEditor::checkInsert(uint32_t group, ChildRef child, const Affine& transform) const {
@@ -210,7 +213,8 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     group.as_child = as_child;
     open_[group_index].reset();
     opened(group_index);
-    changes_.all_nodes = changes_.any = true;
+    rebuilt_.push_back(group_index);
+    changes_.any = true;
     const double more_instances = group.instances_total - instances_before,
                  more_triangles = group.triangles_total - triangles_before;
     group.instances_total = instances_before, group.triangles_total = triangles_before;
@@ -252,6 +256,7 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             const OpenGroup* source = open_[below.index()].get();
             open_.push_back(source ? std::make_unique<OpenGroup>(*source) : nullptr);
             uses_.emplace_back();
+            holders_.emplace_back();
             Group& group = scene_.groups[copy];
             group.as_child = {group.bounds, group.area, group.max_triangle_area};
             if (group.copy_of.empty()) group.copy_of = group.name;
@@ -267,7 +272,6 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             scene_.groups[id.group].instances.setChild(slot, below);
             markEdited(id);
             addUse(id, below);
-            changes_.assets = changes_.any = true;
             refreshUpwards(id.group, open_[id.group]->node_of[slot]);
         }
         id.group = below.index();
@@ -568,15 +572,13 @@ void SceneEditor::groupChanged(uint32_t index) {
                            glm::all(glm::greaterThanEqual(now.bounds.min, was.bounds.min)) &&
                            glm::all(glm::lessThanEqual(now.bounds.max, was.bounds.max)));
         if (fits && now.max_triangle_area <= was.max_triangle_area && now.area <= 2.0 * was.area &&
-            now.area >= 0.5 * was.area)
+            now.area >= 0.5 * was.area) {
+            if (untold_.empty() || untold_.back() != index) untold_.push_back(index);
             return;
-        group.as_child = now;
-        std::vector<uint32_t> holders;
-        for (const auto& [key, count] : child_uses_) {
-            if (uint32_t(key >> 32) == index) holders.push_back(uint32_t(key));
         }
-        std::sort(holders.begin(), holders.end());
-        for (const uint32_t holder : holders) refreshAll(holder);
+        group.as_child = now;
+        const std::map<uint32_t, size_t> holders = holders_[index];
+        for (const auto& [holder, count] : holders) refreshAll(holder);
     }
 }
 
@@ -602,16 +604,29 @@ void SceneEditor::refreshAll(uint32_t group_index) {
 void SceneEditor::countInstances(uint32_t index, double instances, double triangles) {
     scene_.groups[index].instances_total += instances;
     scene_.groups[index].triangles_total += triangles;
-    std::vector<std::pair<uint32_t, size_t>> holders;
-    if (uses_[index].count > 0) {
-        for (const auto& [key, count] : child_uses_) {
-            if (uint32_t(key >> 32) == index) holders.emplace_back(uint32_t(key), count);
-        }
-    }
-    for (const auto& [holder, count] : holders)
+    for (const auto& [holder, count] : holders_[index])
         countInstances(holder, instances * double(count), triangles * double(count));
 }
 
-SceneChanges SceneEditor::takeChanges() { return std::exchange(changes_, {}); }
+SceneChanges SceneEditor::takeChanges() {
+    SceneChanges changes = std::exchange(changes_, {});
+    const std::vector<uint32_t> untold = std::exchange(untold_, {}),
+                                rebuilt = std::exchange(rebuilt_, {});
+    if (!changes.any) return changes;
+    std::vector<uint32_t> changed = untold, around_untold = rebuilt, around_stale;
+    changed.insert(changed.end(), rebuilt.begin(), rebuilt.end());
+    for (const SceneChanges::Node& node : changes.nodes) changed.push_back(node.group);
+    const auto addHolders = [&](uint32_t group, std::vector<uint32_t>& groups) {
+        for (const auto& [holder, count] : holders_[group]) groups.push_back(holder);
+    };
+    for (const uint32_t group : untold) addHolders(group, around_untold);
+    for (uint32_t g = 0; g < scene_.groups.size(); ++g) {
+        if (scene_.groups[g].area != scene_.groups[g].as_child.area) addHolders(g, around_stale);
+    }
+    changes.groups = withHolders(std::move(changed));
+    changes.whole_groups = withHolders(std::move(around_untold));
+    changes.stale_groups = withHolders(std::move(around_stale));
+    return changes;
+}
 
 }  // namespace stipple

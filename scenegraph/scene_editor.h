@@ -6,8 +6,8 @@
 
 #include <scenegraph/scene.h>
 
+#include <map>
 #include <memory>
-#include <unordered_map>
 #include <vector>
 
 namespace stipple {
@@ -26,7 +26,14 @@ struct SceneChanges {
     };
     std::vector<Node> nodes;  // of groups: the instances below are others, or elsewhere
     bool all_nodes = false;   // too many to tell
-    bool assets = false;      // meshes or groups have come
+    // Groups that have changed, and all that hold them.
+    std::vector<uint32_t> groups;
+    // Of these, those in which any node may show something else.
+    std::vector<uint32_t> whole_groups;
+    // Groups with sums that do not know the areas of what they hold (Group::as_child), old changes
+    // included.
+    std::vector<uint32_t> stale_groups;
+    bool assets = false;      // meshes have come
     bool any = false;
 };
 
@@ -75,6 +82,7 @@ public:
     void open(uint32_t group);
 
     const Scene& scene() const { return scene_; }
+    // O(groups, and what holds those that have changed).
     SceneChanges takeChanges();
 
     static constexpr size_t kFewUses = 16;
@@ -117,13 +125,17 @@ private:
     void refreshAll(uint32_t group);
     void countInstances(uint32_t group, double instances, double triangles);
     void note(uint32_t group, uint32_t node);
+    std::vector<uint32_t> withHolders(std::vector<uint32_t> groups) const;
     void markEdited(InstanceId id);
 
     Scene& scene_;
-    std::vector<std::unique_ptr<OpenGroup>> open_;     // by group
-    std::vector<Uses> uses_;                           // by group
-    std::unordered_map<uint64_t, size_t> child_uses_;  // by child group and the group that holds it
+    std::vector<std::unique_ptr<OpenGroup>> open_;  // by group
+    std::vector<Uses> uses_;                        // by group
+    // By group: the groups that hold it, and how often.
+    std::vector<std::map<uint32_t, size_t>> holders_;
     SceneChanges changes_;
+    std::vector<uint32_t> untold_;   // have changed, and the nodes that show them are not noted
+    std::vector<uint32_t> rebuilt_;  // have other nodes
 };
 
 }  // namespace stipple
