@@ -77,9 +77,7 @@ void resizeAtomics(std::vector<std::atomic<T>>& values, size_t size) {
 }  // namespace
 
 PointLists::PointLists(const Scene& scene)
-    : scene_(scene),
-      seen_(scene.meshes.size() * kDirections),
-      factor_of_(scene.groups.size()) {
+    : scene_(scene), seen_(scene.meshes.size() * kDirections), factor_of_(scene.groups.size()) {
     constexpr uint32_t kOften = 8;
     std::vector<uint32_t> uses(scene.groups.size(), 0);
     for (const Group& group : scene.groups) {

@@ -33,11 +33,13 @@ struct SceneChanges {
     // Groups with sums that do not know the areas of what they hold (Group::as_child), old changes
     // included.
     std::vector<uint32_t> stale_groups;
-    bool assets = false;      // meshes have come
+    bool assets = false;  // meshes have come
     bool any = false;
 };
 
-// One at a time for a scene, and no frame at the same time. A group that is instanced many times
+// One at a time for a scene, and no frame at the same time. What is undone leaves the same octree
+// behind: the same residents in the same order, so the same picture, unless it became too deep in
+// between. A group that is instanced many times
 // changes everywhere at once; ownGroup() makes a copy for one place. Indices that are not there, or
 // not any more, singular transforms and groups that would contain themselves throw
 // kInvalidArgument; then nothing has changed.
@@ -46,7 +48,8 @@ public:
     // O(stored instances), once.
     explicit SceneEditor(Scene& scene);
 
-    // O(log n), and O(n) for the first edit of a group. A group's bounds grow in the groups that
+    // O(log n), inserts and moves on average: a part of the octree that has become too deep is made
+    // anew. O(n) for the first edit of a group. A group's bounds grow in the groups that
     // instance it: O(log n) for each of the places, up to kFewUses of them; beyond, only when they
     // have grown, or its area has doubled or halved, and then O(n) of the groups that instance it.
     InstanceId insert(uint32_t group, ChildRef child, const Affine& group_from_child);
@@ -91,6 +94,9 @@ private:
     // What editing must know of a group beside its octree.
     struct OpenGroup {
         std::vector<uint32_t> parent;                    // of each node
+        std::vector<uint32_t> merge_at;                  // of each node: as few are one leaf
+        std::vector<uint32_t> rank_of;                   // by name: residents are in this order
+        int built_height = 0;                            // levels below the root, as opened
         std::vector<uint32_t> slot_of;                   // by name; kGone
         std::vector<uint32_t> node_of;                   // by place
         std::vector<std::vector<uint32_t>> free_places;  // by the binary logarithm of their number
@@ -111,15 +117,17 @@ private:
 
     void place(InstanceId id, ChildRef child, const Affine& group_from_child);
     void take(InstanceId id);
+    static bool isBefore(const OpenGroup& open, uint32_t name_a, uint32_t name_b);
     uint32_t chooseNode(const Group& group, const DVec3& center, const DVec3& half) const;
     void addResident(uint32_t group, uint32_t node, uint32_t name, ChildRef child,
                      const Affine& group_from_child);
-    void moveResidents(uint32_t group, uint32_t from, uint32_t to);
+    void moveResident(uint32_t group, uint32_t from, uint32_t to, uint32_t node);
     uint32_t takePlaces(uint32_t group, uint32_t capacity);
     void freePlaces(uint32_t group, uint32_t first, uint32_t capacity);
     uint32_t takeNodes(uint32_t group, uint32_t count);
     void split(uint32_t group, uint32_t node);
-    void mergeChildren(uint32_t group, uint32_t node);
+    void collapse(uint32_t group, uint32_t node);
+    uint32_t rebuildIfTooDeep(uint32_t group, uint32_t leaf);
     void refreshUpwards(uint32_t group, uint32_t node);
     void groupChanged(uint32_t group);
     void refreshAll(uint32_t group);

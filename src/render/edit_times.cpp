@@ -171,7 +171,8 @@ EditedFrames measureEditedFrames(const Scene& scene, const Camera& camera,
     result.frame_seconds = quantiles(plain).median;
     result.added_seconds = quantiles(added).median;
     result.edit_seconds = quantiles(edits).median;
-    // Of a median: 1.2533 sigma / sqrt(n), with sigma from the quartiles, as outliers are not normal.
+    // Of a median: 1.2533 sigma / sqrt(n), with sigma from the quartiles, as outliers are not
+    // normal.
     std::sort(added.begin(), added.end());
     const double quartiles = added[size_t(count) * 3 / 4] - added[size_t(count) / 4];
     result.added_error = 1.2533 * quartiles / 1.349 / std::sqrt(double(count));

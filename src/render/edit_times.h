@@ -17,11 +17,11 @@ struct EditQuantiles {
 
 // Seconds.
 struct EditedFrames {
-    int count = 0;                   // of frames after an edit
-    double frame_seconds = 0.0;      // median of the frames before and after
-    double added_seconds = 0.0;      // median: an edit and the frame after it beyond a frame without
-    double added_error = 0.0;        // of that median: its standard error
-    double edit_seconds = 0.0;       // median: the edit alone
+    int count = 0;               // of frames after an edit
+    double frame_seconds = 0.0;  // median of the frames before and after
+    double added_seconds = 0.0;  // median: an edit and the frame after it beyond a frame without
+    double added_error = 0.0;    // of that median: its standard error
+    double edit_seconds = 0.0;   // median: the edit alone
 };
 
 struct EditTimes {
