@@ -235,11 +235,56 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     return first;
 }
 
-ChildRef SceneEditor::addMesh(Mesh mesh) {
-    buildMesh(mesh, scene_.materials, mesh.name);
-    scene_.meshes.push_back(std::move(mesh));
+ChildRef SceneEditor::addAsset(const std::string& name, Scene asset, ChildRef child,
+                               const std::string& description) {
+    if (scene_.names.contains(name)) refuse("there is an asset or group \"" + name + "\" already");
+    if (scene_.materials.size() + asset.materials.size() > 65536)
+        refuse("the scene would have more than 65536 materials");
+    const uint32_t first_mesh = uint32_t(scene_.meshes.size()),
+                   first_group = uint32_t(scene_.groups.size()),
+                   first_material = uint32_t(scene_.materials.size());
+    const int first_texture = int(scene_.textures.size());
+    const auto renamed = [&](ChildRef old) {
+        if (old.isNone()) return old;
+        return old.isGroup() ? ChildRef::group(first_group + old.index())
+                             : ChildRef::mesh(first_mesh + old.index());
+    };
+    for (Texture& texture : asset.textures) scene_.textures.push_back(std::move(texture));
+    for (Material& material : asset.materials) {
+        for (int* texture : textureIndices(material)) {
+            if (*texture != kNoTexture) *texture += first_texture;
+        }
+        scene_.materials.push_back(std::move(material));
+    }
+    for (Mesh& mesh : asset.meshes) {
+        for (uint16_t& material : mesh.triangle_material)
+            material = uint16_t(material + first_material);
+        mesh.first_finish += first_material;
+        for (MeshPatch& patch : mesh.patches) {
+            for (MeshPatch::Triangles& triangles : patch.triangles)
+                if (triangles.mesh != MeshPatch::kNoMesh) triangles.mesh += first_mesh;
+            if (patch.surfels != MeshPatch::kNoMesh) patch.surfels += first_mesh;
+        }
+        scene_.meshes.push_back(std::move(mesh));
+    }
+    const size_t n_groups = first_group + asset.groups.size();
+    open_.resize(n_groups);
+    uses_.resize(n_groups);
+    holders_.resize(n_groups);
+    for (Group& group : asset.groups) {
+        const uint32_t index = uint32_t(scene_.groups.size());
+        for (uint32_t i = 0; i < group.instances.size(); ++i) {
+            const ChildRef inner = renamed(group.instances.child(i));
+            group.instances.setChild(i, inner);
+            if (!inner.isNone()) addUse({index, group.listed_index[i]}, inner);
+        }
+        scene_.groups.push_back(std::move(group));
+    }
+    const ChildRef result = renamed(child);
+    scene_.names[name] = result;
+    added_assets_[name] = description;
     changes_.assets = changes_.any = true;
-    return ChildRef::mesh(uint32_t(scene_.meshes.size() - 1));
+    return result;
 }
 
 InstanceId SceneEditor::find(const std::vector<uint32_t>& path) {

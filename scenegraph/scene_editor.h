@@ -78,8 +78,12 @@ public:
     // what is changed there changes nowhere else. O(instances of those groups).
     InstanceId findOwn(const std::vector<uint32_t>& path);
 
-    // Meshes as loaders make them, with materials of the scene; they are built. Returns the first.
-    ChildRef addMesh(Mesh mesh);
+    // Takes over meshes, groups, materials and textures of a built scene, and makes its `child`
+    // known by a name that is new. description: what saveScene() writes, JSON. O(what comes).
+    ChildRef addAsset(const std::string& name, Scene asset, ChildRef child,
+                      const std::string& description);
+    // By name: what addAsset() was given.
+    const std::map<std::string, std::string>& addedAssets() const { return added_assets_; }
 
     // Makes a group's first edit as fast as the others. O(n).
     void open(uint32_t group);
@@ -144,6 +148,7 @@ private:
     SceneChanges changes_;
     std::vector<uint32_t> untold_;   // have changed, and the nodes that show them are not noted
     std::vector<uint32_t> rebuilt_;  // have other nodes
+    std::map<std::string, std::string> added_assets_;
 };
 
 }  // namespace stipple
