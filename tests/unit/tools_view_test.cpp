@@ -19,7 +19,7 @@ Scene makeScene(ThreadPool& pool) {
     Scene scene;
     scene.path = "test";
     scene.lighting.suns.push_back({glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(3.0f)});
-    GeneratedMesh ball = makePrimitive("sphere", 5000, Vec3(0.7f)),
+    GeneratedMesh ball = makePrimitive("sphere", 200000, Vec3(0.7f)),
                   floor = makePrimitive("plane", 2, Vec3(0.4f));
     scene.materials = {ball.materials[0], floor.materials[0]};
     for (uint16_t& material : floor.mesh.triangle_material) material = 1;
