@@ -52,11 +52,12 @@ inline __attribute__((always_inline)) void projectBlock(const View& view,
         const float x_hi = std::max(std::max(p.x[0][i], p.x[1][i]), p.x[2][i]);
         const float y_lo = std::min(std::min(p.y[0][i], p.y[1][i]), p.y[2][i]);
         const float y_hi = std::max(std::max(p.y[0][i], p.y[1][i]), p.y[2][i]);
-        // Clamped on both sides: what lies far outside would not fit into an integer.
-        p.x0[i] = ceilToInt(std::min(std::max(x_lo - 0.5f, left), right));
-        p.x1[i] = floorToInt(std::max(std::min(x_hi - 0.5f, right - 1.0f), left - 1.0f));
-        p.y0[i] = ceilToInt(std::min(std::max(y_lo - 0.5f, top), bottom));
-        p.y1[i] = floorToInt(std::max(std::min(y_hi - 0.5f, bottom - 1.0f), top - 1.0f));
+        // Clamped on both sides: what lies far outside would not fit into an integer. The limits
+        // come first, so that lanes without a triangle, which may be no numbers, give a limit.
+        p.x0[i] = ceilToInt(std::min(right, std::max(left, x_lo - 0.5f)));
+        p.x1[i] = floorToInt(std::max(left - 1.0f, std::min(right - 1.0f, x_hi - 0.5f)));
+        p.y0[i] = ceilToInt(std::min(bottom, std::max(top, y_lo - 0.5f)));
+        p.y1[i] = floorToInt(std::max(top - 1.0f, std::min(bottom - 1.0f, y_hi - 0.5f)));
         const float area = (p.x[1][i] - p.x[0][i]) * (p.y[2][i] - p.y[0][i]) -
                            (p.y[1][i] - p.y[0][i]) * (p.x[2][i] - p.x[0][i]);
         p.inverse_area[i] = std::abs(area) > 0.0f ? 1.0f / area : 0.0f;  // 0 for NaN too
