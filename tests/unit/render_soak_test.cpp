@@ -192,8 +192,10 @@ TEST(Soak, editsAndFramesFromTwoThreadsLeaveMemoryAsItIs) {
                 grown_mb);
     EXPECT_GT(frames, 5u);
     EXPECT_GT(edits, 50u);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they keep what is freed
     // Names are never given again: 4 bytes for each insert stay, and what the allocator rounds up.
     EXPECT_LT(grown_mb, 8.0 + 0.05 * double(settled_bytes) / 1e6);
+#endif
 }
 
 }  // namespace
