@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/tile_triangles.h>
 
+#include <core/vector_clones.h>
+
 #include <algorithm>
 #include <cstring>
 
@@ -178,8 +180,8 @@ inline __attribute__((always_inline)) uint64_t rasterize(const View& view,
 
 }  // namespace
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) uint64_t
-rasterizeTriangles(const View& view, const TriangleBlock& block, DepthTile& tile) {
+STIPPLE_VECTOR_CLONES uint64_t rasterizeTriangles(const View& view, const TriangleBlock& block,
+                                                  DepthTile& tile) {
     return view.orthographic ? rasterize<true>(view, block, tile)
                              : rasterize<false>(view, block, tile);
 }
