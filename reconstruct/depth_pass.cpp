@@ -2,6 +2,7 @@
 #include <reconstruct/depth_pass.h>
 
 #include <core/rng.h>
+#include <core/vector_clones.h>
 #include <reconstruct/tile_triangles.h>
 
 namespace stipple {
@@ -95,9 +96,9 @@ inline __attribute__((always_inline)) void placeLoop(const Window& window, const
     placed.kept = kept;
 }
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void placePoints(
-    bool orthographic, const Window& window, const PointBlock& block,
-    const FootprintTable& footprints, Placed& placed) {
+STIPPLE_VECTOR_CLONES void placePoints(bool orthographic, const Window& window,
+                                       const PointBlock& block, const FootprintTable& footprints,
+                                       Placed& placed) {
     orthographic ? placeLoop<true>(window, block, footprints, placed)
                  : placeLoop<false>(window, block, footprints, placed);
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/depth_tile.h>
 
+#include <core/vector_clones.h>
+
 namespace stipple {
 
 void DepthTile::reset(const SubpixelRect& rect, const RasterTarget* base, uint32_t number_bit) {
@@ -21,8 +23,7 @@ void DepthTile::reset(const SubpixelRect& rect, const RasterTarget* base, uint32
     refreshHidden();
 }
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void
-DepthTile::refreshHidden() {
+STIPPLE_VECTOR_CLONES void DepthTile::refreshHidden() {
     std::fill(farthest_.begin(), farthest_.end(), 0.0f);
     for (int y = 0; y < rect_.height(); ++y) {
         const uint64_t* keys = keys_.data() + size_t(y) * size_t(stride());

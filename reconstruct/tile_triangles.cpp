@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/tile_triangles.h>
 
+#include <core/vector_clones.h>
+
 #include <algorithm>
 #include <cstring>
 
@@ -52,11 +54,12 @@ inline __attribute__((always_inline)) void projectBlock(const View& view,
         const float x_hi = std::max(std::max(p.x[0][i], p.x[1][i]), p.x[2][i]);
         const float y_lo = std::min(std::min(p.y[0][i], p.y[1][i]), p.y[2][i]);
         const float y_hi = std::max(std::max(p.y[0][i], p.y[1][i]), p.y[2][i]);
-        // Clamped on both sides: what lies far outside would not fit into an integer.
-        p.x0[i] = ceilToInt(std::min(std::max(x_lo - 0.5f, left), right));
-        p.x1[i] = floorToInt(std::max(std::min(x_hi - 0.5f, right - 1.0f), left - 1.0f));
-        p.y0[i] = ceilToInt(std::min(std::max(y_lo - 0.5f, top), bottom));
-        p.y1[i] = floorToInt(std::max(std::min(y_hi - 0.5f, bottom - 1.0f), top - 1.0f));
+        // Clamped on both sides: what lies far outside would not fit into an integer. The limits
+        // come first, so that lanes without a triangle, which may be no numbers, give a limit.
+        p.x0[i] = ceilToInt(std::min(right, std::max(left, x_lo - 0.5f)));
+        p.x1[i] = floorToInt(std::max(left - 1.0f, std::min(right - 1.0f, x_hi - 0.5f)));
+        p.y0[i] = ceilToInt(std::min(bottom, std::max(top, y_lo - 0.5f)));
+        p.y1[i] = floorToInt(std::max(top - 1.0f, std::min(bottom - 1.0f, y_hi - 0.5f)));
         const float area = (p.x[1][i] - p.x[0][i]) * (p.y[2][i] - p.y[0][i]) -
                            (p.y[1][i] - p.y[0][i]) * (p.x[2][i] - p.x[0][i]);
         p.inverse_area[i] = std::abs(area) > 0.0f ? 1.0f / area : 0.0f;  // 0 for NaN too
@@ -177,8 +180,8 @@ inline __attribute__((always_inline)) uint64_t rasterize(const View& view,
 
 }  // namespace
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) uint64_t
-rasterizeTriangles(const View& view, const TriangleBlock& block, DepthTile& tile) {
+STIPPLE_VECTOR_CLONES uint64_t rasterizeTriangles(const View& view, const TriangleBlock& block,
+                                                  DepthTile& tile) {
     return view.orthographic ? rasterize<true>(view, block, tile)
                              : rasterize<false>(view, block, tile);
 }

@@ -11,6 +11,7 @@
 #include <array>
 #include <cstring>
 #include <map>
+#include <numeric>
 #include <utility>
 
 namespace stipple {
@@ -63,8 +64,20 @@ struct PointLists::List {
     std::unique_ptr<ListBlock[]> blocks;
 };
 
+namespace {
+
+template <class T>
+void resizeAtomics(std::vector<std::atomic<T>>& values, size_t size) {
+    if (values.size() >= size) return;
+    std::vector<std::atomic<T>> more(size);
+    for (size_t i = 0; i < values.size(); ++i) more[i] = values[i].load();
+    values = std::move(more);
+}
+
+}  // namespace
+
 PointLists::PointLists(const Scene& scene)
-    : scene_(scene), seen_(scene.meshes.size() * kDirections) {
+    : scene_(scene), seen_(scene.meshes.size() * kDirections), factor_of_(scene.groups.size()) {
     constexpr uint32_t kOften = 8;
     std::vector<uint32_t> uses(scene.groups.size(), 0);
     for (const Group& group : scene.groups) {
@@ -78,15 +91,7 @@ PointLists::PointLists(const Scene& scene)
         const Group& group = scene.groups[g];
         group_slots_.emplace_back(uses[g] >= kOften ? group.nodes.size() : 0);
     }
-    followGroups();
-}
-
-// What is known of each group, as the scene is now.
-void PointLists::followGroups() {
-    factors_.clear();
-    factor_of_ = std::vector<std::atomic<const SpacingTable*>>(scene_.groups.size());
-    is_deep_.resize(scene_.groups.size());
-    for (size_t g = 0; g < scene_.groups.size(); ++g) is_deep_[g] = scene_.groups[g].depth > 1;
+    for (const Group& group : scene.groups) is_deep_.push_back(group.depth > 1);
     findStale();
 }
 
@@ -232,42 +237,63 @@ void PointLists::drop(Slot& slot) {
     delete list;
 }
 
+void PointLists::dropEdited(const ListName& name) {
+    Slot& slot = slotOf(name);
+    const List* list = slot.list.load();
+    if (list && slot.last_used.load() == frame_) dropped_.push_back({name, list->block_count});
+    drop(slot);
+}
+
+void PointLists::dropGroup(uint32_t group) {
+    Slots& slots = group_slots_[group];
+    for (uint32_t node = 0; node < slots.size(); ++node) dropEdited({ChildRef::group(group), node});
+}
+
 void PointLists::sceneChanged(const SceneChanges& changes) {
+    const size_t n_groups = scene_.groups.size();
     while (mesh_slots_.size() < scene_.meshes.size())
         mesh_slots_.emplace_back(scene_.meshes[mesh_slots_.size()].nodes.size());
     // What has come since is instanced too seldom to have lists.
-    while (group_slots_.size() < scene_.groups.size()) group_slots_.emplace_back(0);
-    if (seen_.size() < scene_.meshes.size() * kDirections) {
-        std::vector<std::atomic<Seen*>> seen(scene_.meshes.size() * kDirections);
-        for (size_t i = 0; i < seen_.size(); ++i) seen[i] = seen_[i].load();
-        seen_ = std::move(seen);
+    while (group_slots_.size() < n_groups) group_slots_.emplace_back(0);
+    resizeAtomics(seen_, scene_.meshes.size() * kDirections);
+    resizeAtomics(factor_of_, n_groups);
+    std::vector<uint32_t> changed = changes.groups, whole = changes.whole_groups;
+    if (changes.all_nodes) {
+        changed.resize(n_groups);
+        std::iota(changed.begin(), changed.end(), 0);
+        whole = changed;
     }
-    for (const SceneChanges::Node& changed : changes.nodes) {
-        Slots& slots = group_slots_[changed.group];
-        if (changed.node < slots.size()) drop(slots[changed.node]);
+    is_stale_.assign(n_groups, false);
+    for (const uint32_t group : changes.stale_groups) is_stale_[group] = true;
+    is_deep_.resize(n_groups, false);
+    for (const uint32_t group : changed) {
+        factors_.erase(ChildRef::group(group).bits);
+        factor_of_[group] = nullptr;
+        // Points name their instances otherwise then.
+        if (is_deep_[group] != (scene_.groups[group].depth > 1)) {
+            is_deep_[group].flip();
+            dropGroup(group);
+        }
     }
-    const std::vector<bool> was_deep = is_deep_;
-    followGroups();
-    for (size_t g = 0; g < group_slots_.size(); ++g) {
-        Slots& slots = group_slots_[g];
-        const size_t n = scene_.groups[g].nodes.size();
-        if (slots.empty()) continue;
-        // What has changed may lie anywhere within groups of groups.
-        if (changes.all_nodes || is_deep_[g] || (g < was_deep.size() && was_deep[g])) {
-            for (Slot& slot : slots) drop(slot);
+    for (const uint32_t group : whole) dropGroup(group);
+    for (const SceneChanges::Node& changed_node : changes.nodes) {
+        if (changed_node.node < group_slots_[changed_node.group].size())
+            dropEdited({ChildRef::group(changed_node.group), changed_node.node});
+    }
+    for (const uint32_t group : changed) {
+        Slots& slots = group_slots_[group];
+        const size_t n = scene_.groups[group].nodes.size();
+        if (slots.empty() || slots.size() >= n) continue;
+        Slots more(n);
+        for (size_t i = 0; i < slots.size(); ++i) {
+            more[i].list = slots[i].list.load();
+            more[i].last_used = slots[i].last_used.load();
         }
-        if (slots.size() < n) {
-            Slots more(n);
-            for (size_t i = 0; i < slots.size(); ++i) {
-                more[i].list = slots[i].list.load();
-                more[i].last_used = slots[i].last_used.load();
-            }
-            slots = std::move(more);
-        }
+        slots = std::move(more);
     }
 }
 
-void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
+void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes, ThreadPool& pool) {
     retired_.clear();
     bytes_ -= std::exchange(retired_bytes_, 0);
     budget_ = budget_bytes;
@@ -289,6 +315,41 @@ void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes) {
         delete place.exchange(nullptr);
     }
     ++frame_;
+    if (is_new) dropped_.clear();
+    remakeDropped(pool);
+}
+
+// One block after the other, so that all threads share the work of a list.
+void PointLists::remakeDropped(ThreadPool& pool) {
+    struct Job {
+        ListName name;
+        List* list;
+        uint32_t block;
+    };
+    std::vector<Job> jobs;
+    for (const auto& [name, block_count] : std::exchange(dropped_, {})) {
+        Slot& slot = slotOf(name);
+        if (!(scene_.groups[name.child.index()].nodes[name.node].area > 0.0) || slot.list.load() ||
+            !hasLists(name.child) || !takeBudget(block_count * sizeof(ListBlock)))
+            continue;
+        auto list = std::make_unique<List>();
+        list->block_count = block_count;
+        list->blocks = std::make_unique_for_overwrite<ListBlock[]>(block_count);
+        for (uint32_t b = 0; b < block_count; ++b) jobs.push_back({name, list.get(), b});
+        slot.list = list.release();
+        slot.last_used = frame_;
+    }
+    pool.forEach(jobs.size(), [&](size_t i, int) {
+        const Job& job = jobs[i];
+        makePoints(job.name, job.block * kBlockPoints, kBlockPoints, job.list->blocks[job.block]);
+    });
+}
+
+bool PointLists::takeBudget(size_t bytes) {
+    if (bytes_.fetch_add(bytes) + bytes + visible_bytes_ <= budget_) return true;
+    bytes_ -= bytes;
+    is_full_.store(true, std::memory_order_relaxed);
+    return false;
 }
 
 namespace {
@@ -480,12 +541,7 @@ PointLists::List* PointLists::grow(Slot& slot, const ListName& name, uint32_t n_
     if (old && old->block_count >= n_blocks) return old;
     uint32_t capacity = 1;
     while (capacity < n_blocks) capacity *= 2;
-    const size_t added = capacity * sizeof(ListBlock);
-    if (bytes_.fetch_add(added) + added + visible_bytes_ > budget_) {
-        bytes_ -= added;
-        is_full_.store(true, std::memory_order_relaxed);
-        return nullptr;
-    }
+    if (!takeBudget(capacity * sizeof(ListBlock))) return nullptr;
     auto list = std::make_unique<List>();
     list->block_count = capacity;
     list->blocks = std::make_unique_for_overwrite<ListBlock[]>(capacity);

@@ -6,6 +6,7 @@
 // on: Wand et al. 2001 ("Sample caching").
 #pragma once
 
+#include <core/parallel.h>
 #include <core/points.h>
 #include <sampling/list_point.h>
 #include <scenegraph/scene_editor.h>
@@ -82,12 +83,14 @@ public:
         return !slotsOf(child).empty() && !(child.isGroup() && is_stale_[child.index()]);
     }
     // Call between frames: drops the lists of nodes that have changed, keeps the others.
+    // O(what has changed + groups).
     void sceneChanged(const SceneChanges& changes);
     const ListIdentity& identity() const { return identity_; }
     // Call between frames: sets the identity (a new one empties the cache) and the budget. Where
     // it did not suffice, lists that were not used in the last frame are dropped; where it has
-    // become smaller than what is there, all are.
-    void startFrame(const ListIdentity& identity, size_t budget_bytes);
+    // become smaller than what is there, all are. Lists that the last frame used and edits have
+    // dropped are made anew, by all threads.
+    void startFrame(const ListIdentity& identity, size_t budget_bytes, ThreadPool& pool);
     // What can be seen of a mesh from a direction; measured when first asked for, then kept for the
     // frame at least, and beyond it within the budget. Thread-safe.
     const VisibleArea& visibleArea(uint32_t mesh, int direction);
@@ -124,13 +127,16 @@ private:
     Slot& slotOf(const ListName& name);
     Seen& seen(uint32_t mesh, int direction);
     void drop(Slot& slot);
+    void dropEdited(const ListName& name);
+    void dropGroup(uint32_t group);
+    void remakeDropped(ThreadPool& pool);
     template <class Visit>
     void forEachSlot(const Visit& visit);
     void makePoints(const ListName& name, uint32_t first, int count, ListBlock& out);
     void findStale();
-    void followGroups();
     const SpacingTable& factorOf(ChildRef child);
     SpacingTable makeFactor(ChildRef child);
+    bool takeBudget(size_t bytes);
     List* grow(Slot& slot, const ListName& name, uint32_t n_blocks);
 
     const Scene& scene_;
@@ -144,6 +150,12 @@ private:
     std::vector<std::atomic<const SpacingTable*>> factor_of_;  // by group
     std::mutex factor_mutex_;
     std::vector<bool> is_deep_;  // groups that hold groups: their lists' points are prefiltered
+    // Of groups, by edits since the last frame, which used them; with the blocks they had.
+    struct Dropped {
+        ListName name;
+        uint32_t block_count;
+    };
+    std::vector<Dropped> dropped_;
     ListIdentity identity_;
     size_t budget_ = 0;
     std::atomic<size_t> bytes_{0}, visible_bytes_{0};

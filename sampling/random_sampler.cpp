@@ -13,7 +13,7 @@ const FramePlan& RandomizedSampler::plan(const View& view, const RenderSettings&
     view_ = view;
     settings_ = settings;
     lists_.startFrame({settings.seed, settings.sampler, drawsLayers(settings)},
-                      size_t(settings.cache_mb) << 20);
+                      size_t(settings.cache_mb) << 20, pool);
     plan_ = planFrame(scene_, view, settings, false, pool, cancel);
     return plan_;
 }

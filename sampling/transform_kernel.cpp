@@ -2,6 +2,7 @@
 #include <sampling/transform_kernel.h>
 
 #include <core/rng.h>
+#include <core/vector_clones.h>
 
 #include <algorithm>
 #include <cmath>
@@ -77,9 +78,9 @@ inline __attribute__((always_inline)) void transformLoop(const KernelParams& p,
 
 }  // namespace
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void transformPoints(
-    const KernelParams& params, const ListBlock& list, int first_lane, uint32_t first_index,
-    int count, uint32_t first_number, int lane, PointBlock& out) {
+STIPPLE_VECTOR_CLONES void transformPoints(const KernelParams& params, const ListBlock& list,
+                                           int first_lane, uint32_t first_index, int count,
+                                           uint32_t first_number, int lane, PointBlock& out) {
     const auto& l = list;
     const int f = first_lane;
     const uint32_t i = first_index, number = first_number;
@@ -135,9 +136,8 @@ inline __attribute__((always_inline)) void surfelLoop(const SurfelParams& params
 
 }  // namespace
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void makeSurfels(
-    const SurfelParams& params, const ListBlock& list, int first_lane, int count, int lane,
-    PointBlock& out) {
+STIPPLE_VECTOR_CLONES void makeSurfels(const SurfelParams& params, const ListBlock& list,
+                                       int first_lane, int count, int lane, PointBlock& out) {
     params.orthographic ? surfelLoop<true>(params, list, first_lane, count, lane, out)
                         : surfelLoop<false>(params, list, first_lane, count, lane, out);
 }

@@ -5,6 +5,7 @@
 #include <scenegraph/group_sums.h>
 
 #include <bit>
+#include <numeric>
 
 namespace stipple {
 
@@ -12,10 +13,8 @@ namespace {
 
 constexpr uint32_t kGone = 0xffffffffu;
 constexpr uint32_t kMostResidents = 32;  // of a leaf, before it is split
-constexpr uint32_t kFewInstances = 12;   // below a node whose children are leaves: merged
+constexpr uint32_t kFewInstances = 12;   // below a node that was built: merged
 constexpr size_t kMostChanges = 1 << 16;
-
-uint64_t useKey(uint32_t child, uint32_t holder) { return uint64_t(child) << 32 | holder; }
 
 uint32_t placesOf(const GroupNode& node) { return node.resident_count + node.free_count; }
 
@@ -38,6 +37,7 @@ std::string freeName(const Scene& scene, const std::string& name) {
 SceneEditor::SceneEditor(Scene& scene) : scene_(scene) {
     open_.resize(scene.groups.size());
     uses_.resize(scene.groups.size());
+    holders_.resize(scene.groups.size());
     for (uint32_t g = 0; g < scene.groups.size(); ++g) {
         const Group& group = scene.groups[g];
         for (uint32_t i = 0; i < group.instances.size(); ++i) {
@@ -51,7 +51,7 @@ void SceneEditor::addUse(InstanceId place, ChildRef child) {
     if (!child.isGroup()) return;
     Uses& uses = uses_[child.index()];
     if (++uses.count <= kFewUses) uses.places.push_back(place);
-    ++child_uses_[useKey(child.index(), place.group)];
+    ++holders_[child.index()][place.group];
 }
 
 void SceneEditor::removeUse(InstanceId place, ChildRef child) {
@@ -59,8 +59,9 @@ void SceneEditor::removeUse(InstanceId place, ChildRef child) {
     Uses& uses = uses_[child.index()];
     --uses.count;
     std::erase(uses.places, place);
-    const auto found = child_uses_.find(useKey(child.index(), place.group));
-    if (--found->second == 0) child_uses_.erase(found);
+    std::map<uint32_t, size_t>& holders = holders_[child.index()];
+    const auto found = holders.find(place.group);
+    if (--found->second == 0) holders.erase(found);
 }
 
 SceneEditor::OpenGroup& SceneEditor::opened(uint32_t index) {
@@ -73,10 +74,21 @@ SceneEditor::OpenGroup& SceneEditor::opened(uint32_t index) {
     open->parent.assign(group.nodes.size(), 0);
     open->node_of.assign(n, 0);
     open->slot_of.assign(group.next_index, kGone);
-    for (uint32_t i = 0; i < n; ++i) open->slot_of[group.listed_index[i]] = i;
+    open->rank_of.resize(group.next_index);
+    std::iota(open->rank_of.begin(), open->rank_of.end(), 0);
+    for (uint32_t i = 0; i < n; ++i) {
+        open->slot_of[group.listed_index[i]] = i;
+        open->rank_of[group.listed_index[i]] = i;
+    }
+    std::vector<int> depth(group.nodes.size(), 0);
     for (uint32_t i = 0; i < group.nodes.size(); ++i) {
         const GroupNode& node = group.nodes[i];
-        for (uint32_t c = 0; c < node.child_count; ++c) open->parent[node.first_child + c] = i;
+        open->merge_at.push_back(std::min(kFewInstances, node.count / 2));
+        open->built_height = std::max(open->built_height, depth[i]);
+        for (uint32_t c = 0; c < node.child_count; ++c) {  // children come after their parents
+            open->parent[node.first_child + c] = i;
+            depth[node.first_child + c] = depth[i] + 1;
+        }
         for (uint32_t r = 0; r < node.resident_count; ++r) open->node_of[node.first + r] = i;
     }
     open->free_places.resize(33);
@@ -111,21 +123,24 @@ Affine SceneEditor::groupFromChild(InstanceId id) {
     return scene_.groups[id.group].instances.groupFromChild(slot);
 }
 
-bool SceneEditor::reaches(ChildRef from, uint32_t group) const {
-    if (!from.isGroup()) return false;
-    std::vector<uint32_t> stack{from.index()};
+// The groups, each once, and all that hold them.
+std::vector<uint32_t> SceneEditor::withHolders(std::vector<uint32_t> groups) const {
     std::vector<bool> seen(scene_.groups.size(), false);
-    while (!stack.empty()) {
-        const uint32_t g = stack.back();
-        stack.pop_back();
-        if (g == group) return true;
+    std::vector<uint32_t> result;
+    while (!groups.empty()) {
+        const uint32_t g = groups.back();
+        groups.pop_back();
         if (seen[g]) continue;
         seen[g] = true;
-        for (const auto& [key, count] : child_uses_) {
-            if (uint32_t(key) == g) stack.push_back(uint32_t(key >> 32));
-        }
+        result.push_back(g);
+        for (const auto& [holder, count] : holders_[g]) groups.push_back(holder);
     }
-    return false;
+    return result;
+}
+
+bool SceneEditor::reaches(ChildRef from, uint32_t group) const {
+    const std::vector<uint32_t> around = withHolders({group});
+    return std::find(around.begin(), around.end(), from.index()) != around.end();
 }
 
 void SceneEditor::checkInsert(uint32_t group, ChildRef child, const Affine& transform) const {
@@ -210,7 +225,8 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     group.as_child = as_child;
     open_[group_index].reset();
     opened(group_index);
-    changes_.all_nodes = changes_.any = true;
+    rebuilt_.push_back(group_index);
+    changes_.any = true;
     const double more_instances = group.instances_total - instances_before,
                  more_triangles = group.triangles_total - triangles_before;
     group.instances_total = instances_before, group.triangles_total = triangles_before;
@@ -219,11 +235,56 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     return first;
 }
 
-ChildRef SceneEditor::addMesh(Mesh mesh) {
-    buildMesh(mesh, scene_.materials, mesh.name);
-    scene_.meshes.push_back(std::move(mesh));
+ChildRef SceneEditor::addAsset(const std::string& name, Scene asset, ChildRef child,
+                               const std::string& description) {
+    if (scene_.names.contains(name)) refuse("there is an asset or group \"" + name + "\" already");
+    if (scene_.materials.size() + asset.materials.size() > 65536)
+        refuse("the scene would have more than 65536 materials");
+    const uint32_t first_mesh = uint32_t(scene_.meshes.size()),
+                   first_group = uint32_t(scene_.groups.size()),
+                   first_material = uint32_t(scene_.materials.size());
+    const int first_texture = int(scene_.textures.size());
+    const auto renamed = [&](ChildRef old) {
+        if (old.isNone()) return old;
+        return old.isGroup() ? ChildRef::group(first_group + old.index())
+                             : ChildRef::mesh(first_mesh + old.index());
+    };
+    for (Texture& texture : asset.textures) scene_.textures.push_back(std::move(texture));
+    for (Material& material : asset.materials) {
+        for (int* texture : textureIndices(material)) {
+            if (*texture != kNoTexture) *texture += first_texture;
+        }
+        scene_.materials.push_back(std::move(material));
+    }
+    for (Mesh& mesh : asset.meshes) {
+        for (uint16_t& material : mesh.triangle_material)
+            material = uint16_t(material + first_material);
+        mesh.first_finish += first_material;
+        for (MeshPatch& patch : mesh.patches) {
+            for (MeshPatch::Triangles& triangles : patch.triangles)
+                if (triangles.mesh != MeshPatch::kNoMesh) triangles.mesh += first_mesh;
+            if (patch.surfels != MeshPatch::kNoMesh) patch.surfels += first_mesh;
+        }
+        scene_.meshes.push_back(std::move(mesh));
+    }
+    const size_t n_groups = first_group + asset.groups.size();
+    open_.resize(n_groups);
+    uses_.resize(n_groups);
+    holders_.resize(n_groups);
+    for (Group& group : asset.groups) {
+        const uint32_t index = uint32_t(scene_.groups.size());
+        for (uint32_t i = 0; i < group.instances.size(); ++i) {
+            const ChildRef inner = renamed(group.instances.child(i));
+            group.instances.setChild(i, inner);
+            if (!inner.isNone()) addUse({index, group.listed_index[i]}, inner);
+        }
+        scene_.groups.push_back(std::move(group));
+    }
+    const ChildRef result = renamed(child);
+    scene_.names[name] = result;
+    added_assets_[name] = description;
     changes_.assets = changes_.any = true;
-    return ChildRef::mesh(uint32_t(scene_.meshes.size() - 1));
+    return result;
 }
 
 InstanceId SceneEditor::find(const std::vector<uint32_t>& path) {
@@ -252,6 +313,7 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             const OpenGroup* source = open_[below.index()].get();
             open_.push_back(source ? std::make_unique<OpenGroup>(*source) : nullptr);
             uses_.emplace_back();
+            holders_.emplace_back();
             Group& group = scene_.groups[copy];
             group.as_child = {group.bounds, group.area, group.max_triangle_area};
             if (group.copy_of.empty()) group.copy_of = group.name;
@@ -267,7 +329,6 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             scene_.groups[id.group].instances.setChild(slot, below);
             markEdited(id);
             addUse(id, below);
-            changes_.assets = changes_.any = true;
             refreshUpwards(id.group, open_[id.group]->node_of[slot]);
         }
         id.group = below.index();
@@ -287,9 +348,12 @@ void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_
     instanceBox(childSums(scene_, child), group_from_child, center, half);
     const uint32_t node = chooseNode(scene_.groups[id.group], center, half);
     addResident(id.group, node, id.index, child, group_from_child);
+    uint32_t changed = node;
     if (scene_.groups[id.group].nodes[node].child_count == 0 &&
-        scene_.groups[id.group].nodes[node].resident_count > kMostResidents)
+        scene_.groups[id.group].nodes[node].resident_count > kMostResidents) {
         split(id.group, node);
+        changed = rebuildIfTooDeep(id.group, scene_.groups[id.group].nodes[node].first_child);
+    }
     const bool is_group = child.isGroup();
     countInstances(id.group, is_group ? scene_.groups[child.index()].instances_total : 1.0,
                    is_group ? scene_.groups[child.index()].triangles_total
@@ -298,7 +362,7 @@ void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_
         int& depth = scene_.groups[id.group].depth;
         depth = std::max(depth, scene_.groups[child.index()].depth + 1);
     }
-    refreshUpwards(id.group, node);
+    refreshUpwards(id.group, changed);
 }
 
 void SceneEditor::take(InstanceId id) {
@@ -314,29 +378,40 @@ void SceneEditor::take(InstanceId id) {
                             : -double(scene_.meshes[child.index()].triangles.size()));
     GroupNode& node = group.nodes[node_index];
     const uint32_t last = node.first + node.resident_count - 1;
-    group.instances.erase(slot);
-    if (slot != last) {
-        group.instances.swap(slot, last);
-        group.listed_index[slot] = group.listed_index[last];
-        open.slot_of[group.listed_index[slot]] = slot;
+    for (uint32_t i = slot; i < last; ++i) {
+        group.instances.swap(i, i + 1);
+        group.listed_index[i] = group.listed_index[i + 1];
+        open.slot_of[group.listed_index[i]] = i;
     }
+    group.instances.erase(last);
     open.slot_of[id.index] = kGone;
     --node.resident_count;
     if (node.free_count < 0xffff) ++node.free_count;
     // Few below the parent: one leaf again.
-    const uint32_t parent = open.parent[node_index];
     uint32_t start = node_index;
-    if (node_index != 0 && node.child_count == 0 && group.nodes[parent].count <= kFewInstances) {
+    while (start != 0 && group.nodes[start].child_count == 0) {
+        const uint32_t parent = open.parent[start];
         const GroupNode& p = group.nodes[parent];
+        uint32_t count = p.resident_count;
         bool has_leaves = true;
-        for (uint32_t c = 0; c < p.child_count; ++c)
-            has_leaves &= group.nodes[p.first_child + c].child_count == 0;
-        if (has_leaves) {
-            mergeChildren(id.group, parent);
-            start = parent;
+        for (uint32_t c = p.first_child; c < p.first_child + p.child_count; ++c) {
+            has_leaves &= group.nodes[c].child_count == 0;
+            count += group.nodes[c].resident_count;
         }
+        if (!has_leaves || count > open.merge_at[parent]) break;
+        collapse(id.group, parent);
+        start = parent;
     }
     refreshUpwards(id.group, start);
+}
+
+// The order of residents: as they were when the group was opened, then as they came. What goes and
+// comes again finds its old place, on which points depend.
+bool SceneEditor::isBefore(const OpenGroup& open, uint32_t name_a, uint32_t name_b) {
+    const auto rank = [&](uint32_t name) {
+        return name < open.rank_of.size() ? open.rank_of[name] : name;
+    };
+    return std::pair(rank(name_a), name_a) < std::pair(rank(name_b), name_b);
 }
 
 // Down to the child that must grow least; what is about as large as a node stays in it.
@@ -392,18 +467,14 @@ void SceneEditor::freePlaces(uint32_t group, uint32_t first, uint32_t capacity) 
     }
 }
 
-// The residents of a node move to free places `to`.
-void SceneEditor::moveResidents(uint32_t group_index, uint32_t node_index, uint32_t to) {
+// To a free place of a node.
+void SceneEditor::moveResident(uint32_t group_index, uint32_t from, uint32_t to, uint32_t node) {
     OpenGroup& open = *open_[group_index];
     Group& group = scene_.groups[group_index];
-    const GroupNode& node = group.nodes[node_index];
-    for (uint32_t i = 0; i < node.resident_count; ++i) {
-        const uint32_t from = node.first + i;
-        group.instances.swap(from, to + i);
-        group.listed_index[to + i] = group.listed_index[from];
-        open.slot_of[group.listed_index[to + i]] = to + i;
-        open.node_of[to + i] = node_index;
-    }
+    group.instances.swap(from, to);
+    group.listed_index[to] = group.listed_index[from];
+    open.slot_of[group.listed_index[to]] = to;
+    open.node_of[to] = node;
 }
 
 void SceneEditor::addResident(uint32_t group_index, uint32_t node_index, uint32_t name,
@@ -414,7 +485,9 @@ void SceneEditor::addResident(uint32_t group_index, uint32_t node_index, uint32_
         const uint32_t count = group.nodes[node_index].resident_count;
         const uint32_t capacity = std::min(capacityFor(count + 1), count + 0x8000);
         const uint32_t to = takePlaces(group_index, capacity);
-        moveResidents(group_index, node_index, to);
+        const uint32_t first = group.nodes[node_index].first;
+        for (uint32_t i = 0; i < count; ++i)
+            moveResident(group_index, first + i, to + i, node_index);
         GroupNode& node = group.nodes[node_index];
         freePlaces(group_index, node.first, count);
         node.first = to;
@@ -422,7 +495,13 @@ void SceneEditor::addResident(uint32_t group_index, uint32_t node_index, uint32_
     }
     GroupNode& node = group.nodes[node_index];
     --node.free_count;
-    const uint32_t slot = node.first + node.resident_count++;
+    uint32_t slot = node.first + node.resident_count++;
+    for (; slot > node.first && isBefore(open, name, group.listed_index[slot - 1]); --slot) {
+        group.instances.swap(slot, slot - 1);
+        group.listed_index[slot] = group.listed_index[slot - 1];
+        open.slot_of[group.listed_index[slot]] = slot;
+        open.node_of[slot] = node_index;
+    }
     group.instances.set(slot, child, group_from_child);
     group.listed_index[slot] = name;
     open.slot_of[name] = slot;
@@ -441,82 +520,131 @@ uint32_t SceneEditor::takeNodes(uint32_t group_index, uint32_t count) {
     const uint32_t first = uint32_t(group.nodes.size());
     group.nodes.resize(first + count);
     open.parent.resize(first + count, 0);
+    open.merge_at.resize(first + count, 0);
     return first;
 }
 
-// A leaf's residents go to children, by the octant of their centres about the mean.
+namespace {
+
+// Cuts members into two halves at the median of the axis along which they are spread most, these
+// again, and so on; what comes out is eight lists at most, each in its old order.
+void cutInHalves(const std::vector<DVec3>& centers, std::vector<uint32_t> members, int cuts,
+                 std::vector<std::vector<uint32_t>>& parts) {
+    if (cuts == 0 || members.size() < 2) {
+        std::sort(members.begin(), members.end());
+        parts.push_back(std::move(members));
+        return;
+    }
+    DBox3 box;
+    for (const uint32_t i : members) box.extend(centers[i]);
+    const DVec3 extent = box.extent();
+    const int axis =
+        extent.x >= extent.y ? (extent.x >= extent.z ? 0 : 2) : (extent.y >= extent.z ? 1 : 2);
+    const auto middle = members.begin() + std::ptrdiff_t(members.size() / 2);
+    std::nth_element(members.begin(), middle, members.end(), [&](uint32_t a, uint32_t b) {
+        return std::pair(centers[a][axis], a) < std::pair(centers[b][axis], b);
+    });
+    cutInHalves(centers, {members.begin(), middle}, cuts - 1, parts);
+    cutInHalves(centers, {middle, members.end()}, cuts - 1, parts);
+}
+
+}  // namespace
+
+// A leaf's residents go to eight children of as many each, and those are split in turn.
 void SceneEditor::split(uint32_t group_index, uint32_t node_index) {
     OpenGroup& open = *open_[group_index];
     Group& group = scene_.groups[group_index];
     const uint32_t n = group.nodes[node_index].resident_count,
                    first = group.nodes[node_index].first;
     std::vector<DVec3> centers(n);
-    DVec3 mean(0.0);
+    std::vector<uint32_t> all(n);
     for (uint32_t i = 0; i < n; ++i) {
         DVec3 half;
         instanceBox(childSums(scene_, group.instances.child(first + i)),
                     group.instances.groupFromChild(first + i), centers[i], half);
-        mean += centers[i] / double(n);
+        all[i] = i;
     }
-    std::vector<uint32_t> octants[8];
-    for (uint32_t i = 0; i < n; ++i) {
-        const DVec3& c = centers[i];
-        octants[(c.x > mean.x) | (c.y > mean.y) << 1 | (c.z > mean.z) << 2].push_back(i);
-    }
-    uint32_t child_count = 0;
-    for (const auto& octant : octants) child_count += !octant.empty();
-    if (child_count < 2) return;  // all in one place
-    const uint32_t first_child = takeNodes(group_index, child_count);
-    uint32_t c = first_child;
-    for (const auto& octant : octants) {
-        if (octant.empty()) continue;
+    std::vector<std::vector<uint32_t>> parts;
+    cutInHalves(centers, std::move(all), 3, parts);
+    const uint32_t first_child = takeNodes(group_index, uint32_t(parts.size()));
+    for (uint32_t p = 0; p < parts.size(); ++p) {
+        const uint32_t c = first_child + p;
+        const uint32_t count = uint32_t(parts[p].size()),
+                       capacity = std::min(capacityFor(count), count + 0x8000);
         GroupNode child;
-        const uint32_t capacity = capacityFor(uint32_t(octant.size()));
         child.first = takePlaces(group_index, capacity);
-        child.free_count = uint16_t(capacity - octant.size());
-        for (const uint32_t i : octant) {
-            const uint32_t from = first + i, to = child.first + child.resident_count++;
-            group.instances.swap(from, to);
-            group.listed_index[to] = group.listed_index[from];
-            open.slot_of[group.listed_index[to]] = to;
-            open.node_of[to] = c;
-        }
+        child.free_count = uint16_t(capacity - count);
+        for (const uint32_t i : parts[p])
+            moveResident(group_index, first + i, child.first + child.resident_count++, c);
         open.parent[c] = node_index;
         group.nodes[c] = child;
+        if (count > kMostResidents) split(group_index, c);
         accumulateNode(
             group, group.nodes, [&](ChildRef r) { return childSums(scene_, r); }, group.nodes[c]);
         note(group_index, c);
-        ++c;
     }
     GroupNode& node = group.nodes[node_index];
     freePlaces(group_index, node.first, placesOf(node));
     node.first = node.resident_count = 0;
     node.free_count = 0;
     node.first_child = first_child;
-    node.child_count = uint8_t(child_count);
+    node.child_count = uint8_t(parts.size());
+    open.merge_at[node_index] = kMostResidents;
 }
 
-void SceneEditor::mergeChildren(uint32_t group_index, uint32_t node_index) {
+// All below the node into one leaf.
+void SceneEditor::collapse(uint32_t group_index, uint32_t node_index) {
     OpenGroup& open = *open_[group_index];
     Group& group = scene_.groups[group_index];
-    const uint32_t first_child = group.nodes[node_index].first_child,
-                   child_count = group.nodes[node_index].child_count;
-    for (uint32_t c = first_child; c < first_child + child_count; ++c) {
-        const uint32_t first = group.nodes[c].first, places = placesOf(group.nodes[c]);
-        for (uint32_t slot = first; slot < first + group.nodes[c].resident_count; ++slot) {
-            const uint32_t name = group.listed_index[slot];
-            const ChildRef child = group.instances.child(slot);
-            const Affine where = group.instances.groupFromChild(slot);
-            group.instances.erase(slot);
-            addResident(group_index, node_index, name, child, where);
-        }
-        freePlaces(group_index, first, places);
-        group.nodes[c] = GroupNode();
-        note(group_index, c);
+    std::vector<uint32_t> nodes{node_index}, slots;
+    for (size_t i = 0; i < nodes.size(); ++i) {
+        const GroupNode& node = group.nodes[nodes[i]];
+        for (uint32_t r = 0; r < node.resident_count; ++r) slots.push_back(node.first + r);
+        for (uint32_t c = 0; c < node.child_count; ++c) nodes.push_back(node.first_child + c);
     }
-    open.free_nodes[child_count].push_back(first_child);
-    group.nodes[node_index].first_child = 0;
-    group.nodes[node_index].child_count = 0;
+    std::sort(slots.begin(), slots.end(), [&](uint32_t a, uint32_t b) {
+        return isBefore(open, group.listed_index[a], group.listed_index[b]);
+    });
+    const uint32_t count = uint32_t(slots.size()),
+                   capacity = std::min(capacityFor(count), count + 0x8000),
+                   to = takePlaces(group_index, capacity);
+    for (uint32_t i = 0; i < count; ++i) moveResident(group_index, slots[i], to + i, node_index);
+    for (const uint32_t n : nodes) {
+        GroupNode& node = group.nodes[n];
+        freePlaces(group_index, node.first, placesOf(node));
+        if (node.child_count > 0) open.free_nodes[node.child_count].push_back(node.first_child);
+        node = GroupNode();
+        note(group_index, n);
+    }
+    GroupNode& node = group.nodes[node_index];
+    node.first = to;
+    node.resident_count = count;
+    node.free_count = uint16_t(capacity - count);
+}
+
+// Based on: Galperin, Rivest. Scapegoat Trees. 1993. Where a leaf lies deeper than twice what would
+// do, the lowest node above it that is to blame is made anew. Returns the node below which all sums
+// are right: that one, or the leaf's parent.
+uint32_t SceneEditor::rebuildIfTooDeep(uint32_t group_index, uint32_t leaf) {
+    OpenGroup& open = *open_[group_index];
+    Group& group = scene_.groups[group_index];
+    // A tree of eight children a node has half of these levels.
+    const auto mostLevels = [](uint32_t count) {
+        return 1.0 + std::log2(std::max(count / 8.0, 1.0)) / 2.0;
+    };
+    int depth = 0;
+    for (uint32_t n = leaf; n != 0; n = open.parent[n]) ++depth;
+    const double allowed =
+        std::max(mostLevels(group.nodes[0].count), double(open.built_height + 1));
+    if (depth <= allowed) return open.parent[leaf];
+    int levels = 1;
+    uint32_t node = open.parent[leaf];
+    for (; node != 0; node = open.parent[node], ++levels) {
+        if (levels > mostLevels(group.nodes[node].count)) break;
+    }
+    collapse(group_index, node);
+    if (group.nodes[node].resident_count > kMostResidents) split(group_index, node);
+    return node;
 }
 
 void SceneEditor::note(uint32_t group, uint32_t node) {
@@ -568,15 +696,13 @@ void SceneEditor::groupChanged(uint32_t index) {
                            glm::all(glm::greaterThanEqual(now.bounds.min, was.bounds.min)) &&
                            glm::all(glm::lessThanEqual(now.bounds.max, was.bounds.max)));
         if (fits && now.max_triangle_area <= was.max_triangle_area && now.area <= 2.0 * was.area &&
-            now.area >= 0.5 * was.area)
+            now.area >= 0.5 * was.area) {
+            if (untold_.empty() || untold_.back() != index) untold_.push_back(index);
             return;
-        group.as_child = now;
-        std::vector<uint32_t> holders;
-        for (const auto& [key, count] : child_uses_) {
-            if (uint32_t(key >> 32) == index) holders.push_back(uint32_t(key));
         }
-        std::sort(holders.begin(), holders.end());
-        for (const uint32_t holder : holders) refreshAll(holder);
+        group.as_child = now;
+        const std::map<uint32_t, size_t> holders = holders_[index];
+        for (const auto& [holder, count] : holders) refreshAll(holder);
     }
 }
 
@@ -602,16 +728,29 @@ void SceneEditor::refreshAll(uint32_t group_index) {
 void SceneEditor::countInstances(uint32_t index, double instances, double triangles) {
     scene_.groups[index].instances_total += instances;
     scene_.groups[index].triangles_total += triangles;
-    std::vector<std::pair<uint32_t, size_t>> holders;
-    if (uses_[index].count > 0) {
-        for (const auto& [key, count] : child_uses_) {
-            if (uint32_t(key >> 32) == index) holders.emplace_back(uint32_t(key), count);
-        }
-    }
-    for (const auto& [holder, count] : holders)
+    for (const auto& [holder, count] : holders_[index])
         countInstances(holder, instances * double(count), triangles * double(count));
 }
 
-SceneChanges SceneEditor::takeChanges() { return std::exchange(changes_, {}); }
+SceneChanges SceneEditor::takeChanges() {
+    SceneChanges changes = std::exchange(changes_, {});
+    const std::vector<uint32_t> untold = std::exchange(untold_, {}),
+                                rebuilt = std::exchange(rebuilt_, {});
+    if (!changes.any) return changes;
+    std::vector<uint32_t> changed = untold, around_untold = rebuilt, around_stale;
+    changed.insert(changed.end(), rebuilt.begin(), rebuilt.end());
+    for (const SceneChanges::Node& node : changes.nodes) changed.push_back(node.group);
+    const auto addHolders = [&](uint32_t group, std::vector<uint32_t>& groups) {
+        for (const auto& [holder, count] : holders_[group]) groups.push_back(holder);
+    };
+    for (const uint32_t group : untold) addHolders(group, around_untold);
+    for (uint32_t g = 0; g < scene_.groups.size(); ++g) {
+        if (scene_.groups[g].area != scene_.groups[g].as_child.area) addHolders(g, around_stale);
+    }
+    changes.groups = withHolders(std::move(changed));
+    changes.whole_groups = withHolders(std::move(around_untold));
+    changes.stale_groups = withHolders(std::move(around_stale));
+    return changes;
+}
 
 }  // namespace stipple

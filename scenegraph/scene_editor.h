@@ -6,8 +6,8 @@
 
 #include <scenegraph/scene.h>
 
+#include <map>
 #include <memory>
-#include <unordered_map>
 #include <vector>
 
 namespace stipple {
@@ -26,11 +26,20 @@ struct SceneChanges {
     };
     std::vector<Node> nodes;  // of groups: the instances below are others, or elsewhere
     bool all_nodes = false;   // too many to tell
-    bool assets = false;      // meshes or groups have come
+    // Groups that have changed, and all that hold them.
+    std::vector<uint32_t> groups;
+    // Of these, those in which any node may show something else.
+    std::vector<uint32_t> whole_groups;
+    // Groups with sums that do not know the areas of what they hold (Group::as_child), old changes
+    // included.
+    std::vector<uint32_t> stale_groups;
+    bool assets = false;  // meshes have come
     bool any = false;
 };
 
-// One at a time for a scene, and no frame at the same time. A group that is instanced many times
+// One at a time for a scene, and no frame at the same time. What is undone leaves the same octree
+// behind: the same residents in the same order, so the same picture, unless it became too deep in
+// between. A group that is instanced many times
 // changes everywhere at once; ownGroup() makes a copy for one place. Indices that are not there, or
 // not any more, singular transforms and groups that would contain themselves throw
 // kInvalidArgument; then nothing has changed.
@@ -39,7 +48,8 @@ public:
     // O(stored instances), once.
     explicit SceneEditor(Scene& scene);
 
-    // O(log n), and O(n) for the first edit of a group. A group's bounds grow in the groups that
+    // O(log n), inserts and moves on average: a part of the octree that has become too deep is made
+    // anew. O(n) for the first edit of a group. A group's bounds grow in the groups that
     // instance it: O(log n) for each of the places, up to kFewUses of them; beyond, only when they
     // have grown, or its area has doubled or halved, and then O(n) of the groups that instance it.
     InstanceId insert(uint32_t group, ChildRef child, const Affine& group_from_child);
@@ -68,13 +78,18 @@ public:
     // what is changed there changes nowhere else. O(instances of those groups).
     InstanceId findOwn(const std::vector<uint32_t>& path);
 
-    // Meshes as loaders make them, with materials of the scene; they are built. Returns the first.
-    ChildRef addMesh(Mesh mesh);
+    // Takes over meshes, groups, materials and textures of a built scene, and makes its `child`
+    // known by a name that is new. description: what saveScene() writes, JSON. O(what comes).
+    ChildRef addAsset(const std::string& name, Scene asset, ChildRef child,
+                      const std::string& description);
+    // By name: what addAsset() was given.
+    const std::map<std::string, std::string>& addedAssets() const { return added_assets_; }
 
     // Makes a group's first edit as fast as the others. O(n).
     void open(uint32_t group);
 
     const Scene& scene() const { return scene_; }
+    // O(groups, and what holds those that have changed).
     SceneChanges takeChanges();
 
     static constexpr size_t kFewUses = 16;
@@ -83,6 +98,9 @@ private:
     // What editing must know of a group beside its octree.
     struct OpenGroup {
         std::vector<uint32_t> parent;                    // of each node
+        std::vector<uint32_t> merge_at;                  // of each node: as few are one leaf
+        std::vector<uint32_t> rank_of;                   // by name: residents are in this order
+        int built_height = 0;                            // levels below the root, as opened
         std::vector<uint32_t> slot_of;                   // by name; kGone
         std::vector<uint32_t> node_of;                   // by place
         std::vector<std::vector<uint32_t>> free_places;  // by the binary logarithm of their number
@@ -103,27 +121,34 @@ private:
 
     void place(InstanceId id, ChildRef child, const Affine& group_from_child);
     void take(InstanceId id);
+    static bool isBefore(const OpenGroup& open, uint32_t name_a, uint32_t name_b);
     uint32_t chooseNode(const Group& group, const DVec3& center, const DVec3& half) const;
     void addResident(uint32_t group, uint32_t node, uint32_t name, ChildRef child,
                      const Affine& group_from_child);
-    void moveResidents(uint32_t group, uint32_t from, uint32_t to);
+    void moveResident(uint32_t group, uint32_t from, uint32_t to, uint32_t node);
     uint32_t takePlaces(uint32_t group, uint32_t capacity);
     void freePlaces(uint32_t group, uint32_t first, uint32_t capacity);
     uint32_t takeNodes(uint32_t group, uint32_t count);
     void split(uint32_t group, uint32_t node);
-    void mergeChildren(uint32_t group, uint32_t node);
+    void collapse(uint32_t group, uint32_t node);
+    uint32_t rebuildIfTooDeep(uint32_t group, uint32_t leaf);
     void refreshUpwards(uint32_t group, uint32_t node);
     void groupChanged(uint32_t group);
     void refreshAll(uint32_t group);
     void countInstances(uint32_t group, double instances, double triangles);
     void note(uint32_t group, uint32_t node);
+    std::vector<uint32_t> withHolders(std::vector<uint32_t> groups) const;
     void markEdited(InstanceId id);
 
     Scene& scene_;
-    std::vector<std::unique_ptr<OpenGroup>> open_;     // by group
-    std::vector<Uses> uses_;                           // by group
-    std::unordered_map<uint64_t, size_t> child_uses_;  // by child group and the group that holds it
+    std::vector<std::unique_ptr<OpenGroup>> open_;  // by group
+    std::vector<Uses> uses_;                        // by group
+    // By group: the groups that hold it, and how often.
+    std::vector<std::map<uint32_t, size_t>> holders_;
     SceneChanges changes_;
+    std::vector<uint32_t> untold_;   // have changed, and the nodes that show them are not noted
+    std::vector<uint32_t> rebuilt_;  // have other nodes
+    std::map<std::string, std::string> added_assets_;
 };
 
 }  // namespace stipple

@@ -59,7 +59,8 @@ Json editsOf(const Group& group, const std::unordered_map<uint32_t, std::string>
 
 }  // namespace
 
-void saveScene(const Scene& scene, const std::string& path) {
+void saveScene(const Scene& scene, const std::map<std::string, std::string>& assets,
+               const std::string& path) {
     if (!scene.path.ends_with(".scene.json"))
         refuse(scene.path, "only scene files (*.scene.json) can be saved");
     if (!path.ends_with(".scene.json")) refuse(path, "a scene file's name ends in .scene.json");
@@ -88,6 +89,7 @@ void saveScene(const Scene& scene, const std::string& path) {
                        " is part of a model, not of the scene file: its edits cannot be saved");
         edits[name->second] = editsOf(group, names, path);
     }
+    for (const auto& [name, text] : assets) document["assets"][name] = parseJson(text, name);
     document.erase("edits");
     if (!edits.empty()) document["edits"] = std::move(edits);
     saveFile(path, document.dump(1, ' ') + "\n");

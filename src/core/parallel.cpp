@@ -29,8 +29,10 @@ int ThreadPool::threadCount() const { return impl_->n_threads; }
 void ThreadPool::forEach(size_t count, const std::function<void(size_t, int)>& body) {
     // One task a thread and a shared counter: indices go out in ascending order and `thread` is
     // exclusive to a task. TBB only keeps tasks from starting after an exception; those that run
-    // look at has_failed.
+    // look at has_failed. The counter also orders memory between caller and tasks, which TBB does,
+    // too, but ThreadSanitizer does not see there.
     std::atomic<size_t> next{0};
+    next.store(0, std::memory_order_release);
     std::atomic<bool> has_failed{false};
     const size_t tasks = std::min(count, size_t(impl_->n_threads));
     impl_->arena.execute([&] {
@@ -39,7 +41,7 @@ void ThreadPool::forEach(size_t count, const std::function<void(size_t, int)>& b
             [&](size_t thread) {
                 try {
                     for (size_t i; !has_failed.load(std::memory_order_relaxed) &&
-                                   (i = next.fetch_add(1, std::memory_order_relaxed)) < count;)
+                                   (i = next.fetch_add(1, std::memory_order_acq_rel)) < count;)
                         body(i, int(thread));
                 } catch (...) {
                     has_failed = true;
@@ -48,6 +50,7 @@ void ThreadPool::forEach(size_t count, const std::function<void(size_t, int)>& b
             },
             tbb::simple_partitioner());
     });
+    next.load(std::memory_order_acquire);
 }
 
 }  // namespace stipple

@@ -24,6 +24,22 @@ std::vector<RasterMesh> rasterMeshes(const Scene& scene) {
     return meshes;
 }
 
+std::vector<CutBox> cutBoxes(const Scene& scene, const FramePlan& plan) {
+    std::vector<CutBox> boxes;
+    for (const PlannedNode& node : plan.nodes) {
+        const Box3& bounds = nodeBounds(scene, node.child, node.node);
+        CutBox box;
+        for (int i = 0; i < 8; ++i) {
+            DVec3 p;
+            for (int axis = 0; axis < 3; ++axis)
+                p[axis] = double((i >> axis & 1) ? bounds.max[axis] : bounds.min[axis]);
+            box.corners[size_t(i)] = Vec3(node.camera_from_child.point(p));
+        }
+        boxes.push_back(box);
+    }
+    return boxes;
+}
+
 // Pixels along a side of one of the first look's: pages of shadows are found by a coarse one.
 constexpr int kShadowLookPixels = 4, kOcclusionLookPixels = 1;
 
@@ -108,13 +124,14 @@ struct Renderer::Impl {
             stats.points_kept ? double(stats.points_drawn) / double(stats.points_kept) : 0.0;
     }
 
-    void drawPoints(const FrameRequest& request, const View& view, Picture& picture,
-                    FrameStats& stats) {
+    void drawPoints(const FrameRequest& request, const View& view, Picture& picture, Frame& frame) {
+        FrameStats& stats = frame.stats;
         const Visibility visibility = makeVisibility(request, view, stats);
         if (request.progress) request.progress("plan", 0.0);
         const Stopwatch plan_watch;
         const FramePlan& plan = sampler.plan(view, request.settings, pool, request.cancel);
         stats.phases.emplace_back("plan", plan_watch.seconds());
+        if (request.wants_cut) frame.cut = cutBoxes(scene, plan);
         drawPlan(request, view, plan, &sampler, visibility, picture, stats);
         stats.cache_bytes = sampler.cacheBytes();
     }
@@ -179,7 +196,7 @@ Frame Renderer::render(const FrameRequest& asked) {
     if (is_debugging) picture.watch(debug_x, debug_y);
     switch (request.settings.method) {
         case Method::kPoints:
-            impl_->drawPoints(request, view, picture, frame.stats);
+            impl_->drawPoints(request, view, picture, frame);
             break;
         case Method::kZBuffer:
             impl_->drawZBuffer(request, view, picture, frame.stats);

@@ -8,6 +8,7 @@
 #include <scenegraph/scene.h>
 #include <scenegraph/scene_editor.h>
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -42,9 +43,15 @@ struct FrameStats {
     std::string debug_text;        // one line on the pixel asked for
 };
 
+// A node of the cut that a frame was planned from.
+struct CutBox {
+    std::array<Vec3, 8> corners;  // camera space, m; bit i of the index: the upper end of axis i
+};
+
 struct Frame {
     Image image;  // linear: R, G, B, A (premultiplied background-free if transparent) and the AOV
                   // channels asked for
+    std::vector<CutBox> cut;  // if asked for; of points
     FrameStats stats;
 };
 
@@ -54,6 +61,9 @@ struct FrameRequest {
     bool transparent = false;       // leave the background out; A is coverage
     std::vector<std::string> aovs;  // depth, normal, albedo, object, coverage, count
     std::string debug_pixel;        // "x,y": described in FrameStats::debug_text
+    bool wants_cut = false;         // Frame::cut
+    bool tints_kinds = false;       // albedo tells what is drawn as points (green), what as
+                                    // triangles (orange); not of rays
     const CancelFlag* cancel = nullptr;
     std::function<void(const char* phase, double fraction)>
         progress;  // may be empty; called from one thread at a time

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <render/screen_occlusion.h>
 
+#include <core/vector_clones.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -43,8 +45,7 @@ constexpr int32_t kOpen = 1, kHit = 2;
 
 // What lies at each place. Texels are compared with the plane through the place along the surface:
 // a surface does not occlude itself, however slanted.
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void lookUp(
-    const OcclusionProbes& probes, const Query& q, int32_t* outcome) {
+STIPPLE_VECTOR_CLONES void lookUp(const OcclusionProbes& probes, const Query& q, int32_t* outcome) {
     constexpr int kCount = OcclusionProbes::kCount;
     alignas(64) std::array<float, kCount> z;
     alignas(64) std::array<int32_t, kCount> texel;

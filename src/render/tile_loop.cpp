@@ -74,21 +74,25 @@ double expectedPoints(const Batch& batch, const SubpixelRect& inner) {
            (double(r.width()) * r.height());
 }
 
+const Vec3 kPointTint(0.1f, 0.7f, 0.1f), kTriangleTint(0.9f, 0.4f, 0.05f);
+
 class NumberLookup : public SampleLookup {
 public:
-    NumberLookup(const TileEmitter* emitter, const TriangleLookup& triangles)
-        : emitter_(emitter), triangles_(triangles) {}
+    NumberLookup(const TileEmitter* emitter, const TriangleLookup& triangles, bool tints_kinds)
+        : emitter_(emitter), triangles_(triangles), tints_kinds_(tints_kinds) {}
     void lookUp(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample) const override {
         if (number & kZBufferBit) {
             triangles_(number & ~kZBufferBit, sub_x, sub_y, sample);
         } else {
             emitter_->attributes(number, sub_x, sub_y, sample);
         }
+        if (tints_kinds_) sample.albedo = (number & kAnyTriangle) ? kTriangleTint : kPointTint;
     }
 
 private:
     const TileEmitter* emitter_;
     const TriangleLookup& triangles_;
+    const bool tints_kinds_;
 };
 
 // What a thread keeps from tile to tile.
@@ -118,7 +122,7 @@ TileTimes runTiles(const TileJob& job, ThreadPool& pool, const FrameRequest& req
             if (job.source) worker.emitter = job.source->makeEmitter();
         }
         TileReconstruction& reconstruction = *worker.reconstruction;
-        const NumberLookup lookup(worker.emitter.get(), *job.triangle_lookup);
+        const NumberLookup lookup(worker.emitter.get(), *job.triangle_lookup, request.tints_kinds);
         const Tile& tile = tiles[t];
 
         const Stopwatch draw_watch;

@@ -241,6 +241,13 @@ std::string editTable(const EditTimes& edits) {
     line("remove", edits.remove);
     append(text, "    at once  %8.2f million inserts a second\n",
            edits.bulk_inserts_per_second * 1e-6);
+    if (edits.frames.count > 0) {
+        append(text,
+               "    an edit of what is seen adds %.2f +- %.2f ms to a frame of %.1f ms, itself "
+               "included\n",
+               edits.frames.added_seconds * 1e3, edits.frames.added_error * 1e3,
+               edits.frames.frame_seconds * 1e3);
+    }
     if (edits.embree.commit > 0.0) {
         append(
             text,
@@ -262,6 +269,13 @@ Json editsJson(const EditTimes& edits) {
                  {"move", quantiles(edits.move)},
                  {"remove", quantiles(edits.remove)},
                  {"bulk_inserts_per_second", edits.bulk_inserts_per_second}};
+    if (edits.frames.count > 0) {
+        json["frames"] = {{"count", edits.frames.count},
+                          {"frame_seconds", edits.frames.frame_seconds},
+                          {"added_seconds", edits.frames.added_seconds},
+                          {"added_error_seconds", edits.frames.added_error},
+                          {"edit_seconds", edits.frames.edit_seconds}};
+    }
     if (edits.embree.commit > 0.0) {
         json["embree_commit_seconds"] = edits.embree.commit;
         json["embree_dynamic_commit_seconds"] = edits.embree.dynamic;

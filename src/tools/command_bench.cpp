@@ -108,7 +108,7 @@ void checkCommandLine(CommandLine& line) {
     makeView(Camera(), line.width, line.height, 1);  // throws for absurd sizes
 }
 
-constexpr int kEdits = 20000;
+constexpr int kEdits = 20000, kEditedFrames = 48;
 
 std::vector<const Camera*> chooseCameras(const Scene& scene,
                                          const std::vector<std::string>& names) {
@@ -187,6 +187,10 @@ ExitCode runBench(const std::vector<std::string>& arguments) {
     }
     progress.update("edits", 0.0);
     result.edits = measureEdits(scene, kEdits, line.bench.against_raycast, pool);
+    RenderSettings edited_settings = settings;
+    edited_settings.subpixels = 2;
+    result.edits.frames =
+        measureEditedFrames(scene, *cameras[0], edited_settings, kEditedFrames, pool);
     progress.finish();
     std::cout << editTable(result.edits);
     if (!line.json.empty()) saveFile(line.json, benchJson(result));

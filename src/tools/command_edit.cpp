@@ -5,6 +5,7 @@
 #include <render/live_scene.h>
 #include <scenegraph/io/json.h>
 #include <scenegraph/io/load.h>
+#include <scenegraph/io/new_asset.h>
 #include <scenegraph/io/scene_save.h>
 #include <tools/choose_camera.h>
 #include <tools/command_line.h>
@@ -40,8 +41,8 @@ const HelpText kHelp = {
     "Changes a scene and draws it, one JSON object a line: {\"do\": \"insert\", \"child\": "
     "\"oak\", "
     "\"group\": \"trees\", \"translation\": [10, 0, 5]}. Commands are insert, remove, move, "
-    "replace, "
-    "restore, camera, render and save; docs/cli.md lists their keys. A line with an error is "
+    "replace, restore, asset, camera, render and save; docs/cli.md lists their keys. A line with "
+    "an error is "
     "reported and changes nothing; the others are done. Prints a line of JSON for each instance "
     "inserted, and the path of each file written.",
     {"stipple edit scenes/forest.scene.json --script edits.jsonl -o frame_%04d.png",
@@ -77,7 +78,7 @@ class EditSession {
 public:
     EditSession(const EditOptions& options, Scene scene, ThreadPool& pool,
                 const RenderSettings& settings, const CancelFlag& cancel)
-        : options_(options), path_(scene.path), live_(std::move(scene), pool) {
+        : options_(options), path_(scene.path), pool_(pool), live_(std::move(scene), pool) {
         request_.settings = settings;
         request_.cancel = &cancel;
         live_.edit([&](SceneEditor& editor) {
@@ -103,14 +104,15 @@ public:
                 std::cout << result.dump() << std::endl;
             }
             if (what == "camera") request_.camera = cameraOf(command, editor.scene());
-            if (what == "save") save(command, editor.scene());
+            if (what == "asset") addAsset(command, editor);
+            if (what == "save") save(command, editor);
         });
         if (what == "render") render(command);
-        if (!is_edit && what != "camera" && what != "save" && what != "render") {
+        if (!is_edit && what != "asset" && what != "camera" && what != "save" && what != "render") {
             throw Error(
                 ErrorCode::kInvalidScene, "/do",
                 "there is no " + inQuotes(what) +
-                    "; insert, remove, move, replace, restore, camera, render and save are");
+                    "; insert, remove, move, replace, restore, asset, camera, render and save are");
         }
     }
 
@@ -147,15 +149,28 @@ private:
         std::cout << output << std::endl;
     }
 
-    void save(const Json& command, const Scene& scene) {
+    void addAsset(const Json& command, SceneEditor& editor) {
+        const auto [name, asset] = assetOf(command, editor.scene());
+        Diagnostics diagnostics;
+        const LoadOptions load_options = {options_.allow_outside, options_.memory_limit_mb,
+                                          request_.cancel};
+        const Stopwatch watch;
+        NewAsset added = loadNewAsset(path_, name, asset, load_options, pool_, diagnostics);
+        editor.addAsset(name, std::move(added.scene), added.child, asset.dump());
+        seconds_["asset"].push_back(watch.seconds());
+        for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
+    }
+
+    void save(const Json& command, const SceneEditor& editor) {
         checkKeys(command, {"output"});
         const std::string output = stringOf(command, "output");
-        saveScene(scene, output);
+        saveScene(editor.scene(), editor.addedAssets(), output);
         std::cout << output << std::endl;
     }
 
     const EditOptions& options_;
     std::string path_;
+    ThreadPool& pool_;
     LiveScene live_;
     FrameRequest request_;
     EditMemory memory_;

@@ -194,6 +194,17 @@ bool runEdit(const Json& command, SceneEditor& editor, EditMemory& memory, Insta
     return false;
 }
 
+std::pair<std::string, Json> assetOf(const Json& command, const Scene& scene) {
+    const std::string name = stringOf(command, "name");
+    if (name.empty()) fail("/name", "is empty");
+    if (scene.names.contains(name))
+        fail("/name", "there is an asset or group " + inQuotes(name) + " already");
+    Json asset = command;
+    asset.erase("do");
+    asset.erase("name");
+    return {name, asset};
+}
+
 Camera cameraOf(const Json& command, const Scene& scene) {
     checkKeys(command, {"name", "eye", "target", "direction", "up", "fov"});
     if (command.contains("name")) {

@@ -25,6 +25,9 @@ struct EditMemory {
 bool runEdit(const nlohmann::json& command, SceneEditor& editor, EditMemory& memory,
              InstanceId& edited);
 
+// The name and the description of what "asset" adds: the command's other keys.
+std::pair<std::string, nlohmann::json> assetOf(const nlohmann::json& command, const Scene& scene);
+
 // The camera that "camera" sets: one of the scene by its name, or a new one.
 Camera cameraOf(const nlohmann::json& command, const Scene& scene);
 

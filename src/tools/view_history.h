@@ -10,7 +10,9 @@ namespace stipple {
 
 class EditHistory {
 public:
-    void insert(SceneEditor& editor, uint32_t group, ChildRef child, const Affine& transform);
+    // All in one step. What was planted before one that cannot be stays, in the step.
+    void insert(SceneEditor& editor, uint32_t group, ChildRef child,
+                const std::vector<Affine>& transforms);
     void remove(SceneEditor& editor, InstanceId id);
     void move(SceneEditor& editor, InstanceId id, const Affine& transform);
 
@@ -26,11 +28,12 @@ private:
         ChildRef child = ChildRef::none();
         Affine transform;
     };
-    struct Step {
+    struct Change {
         InstanceId id;
         State before, after;
     };
-    void add(const Step& step);
+    using Step = std::vector<Change>;
+    void add(Step step);
     static void change(SceneEditor& editor, InstanceId id, const State& from, const State& to);
 
     std::vector<Step> steps_;

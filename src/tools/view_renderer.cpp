@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tools/view_renderer.h>
 
+#include <core/stopwatch.h>
+
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 namespace stipple {
 
@@ -49,11 +52,29 @@ bool ViewRenderer::take(ShownPicture& picture) {
     return true;
 }
 
-// Level 0 is as small as the frame time asks for; then full size with a sample a pixel, with four,
-// and as was wished.
+namespace {
+
+// Level 0, while the camera moves, is as small as the frame time asks for. Then full size: with a
+// sample a pixel, with four, and as was wished; or sparkling in.
+constexpr int kCoarseLevels = 4;
+constexpr double kSparkles[] = {1.0, 10.0, 50.0, 75.0, 100.0};  // per cent
+constexpr double kLeastSamples = 0.001;                         // as the settings table has it
+
+double pointsOf(const RenderSettings& s) {
+    return s.samples * s.subpixels * s.subpixels * s.width * s.height;
+}
+
+}  // namespace
+
+int ViewRenderer::levelCount(const ViewWish& wish) {
+    return wish.sparkles ? 1 + int(std::size(kSparkles)) : kCoarseLevels;
+}
+
 RenderSettings ViewRenderer::settingsOf(const ViewWish& wish, int level) const {
     RenderSettings s = wish.settings;
-    if (level < kLevels - 1) {
+    if (level > 0 && wish.sparkles) {
+        s.samples = std::max(kLeastSamples, s.samples * kSparkles[level - 1] / 100.0);
+    } else if (level < kCoarseLevels - 1) {
         s.samples = std::min(1.0, s.samples);
         s.subpixels = std::min(s.subpixels, level == 2 ? 2 : 1);
         s.area_threshold = 16.0;
@@ -69,7 +90,8 @@ RenderSettings ViewRenderer::settingsOf(const ViewWish& wish, int level) const {
 
 void ViewRenderer::run() {
     uint64_t drawn_version = 0;
-    int level = kLevels;  // the next to draw
+    int level = 0, level_count = 0;  // the next to draw, of so many
+    Stopwatch view_watch;
     for (;;) {
         FrameRequest request;
         ViewWish wish;
@@ -77,17 +99,26 @@ void ViewRenderer::run() {
         {
             std::unique_lock lock(mutex_);
             wished_.wait(lock, [&] {
-                return is_ending_ || (has_wish_ && (version_ != drawn_version || level < kLevels));
+                return is_ending_ ||
+                       (has_wish_ && (version_ != drawn_version || level < level_count));
             });
             if (is_ending_) return;
-            if (version_ != drawn_version) drawn_version = version_, level = 0;
             wish = wish_;
+            if (version_ != drawn_version) {
+                drawn_version = version_, level = 0;
+                level_count = levelCount(wish);
+                view_watch = Stopwatch();
+            }
             cancel_ = cancel = std::make_shared<CancelFlag>();
         }
         request.camera = wish.camera;
         request.settings = settingsOf(wish, level);
-        request.aovs = {"depth", "object"};
-        request.cancel = cancel.get();
+        request.aovs = {"depth", "object", "count"};
+        request.wants_cut = wish.wants_cut;
+        request.tints_kinds = wish.tints_kinds;
+        // A first picture is drawn whole even where the camera has moved on: a camera that never
+        // rests would leave none.
+        if (level > 0) request.cancel = cancel.get();
         Frame frame;
         try {
             frame = scene_.render(request);
@@ -95,11 +126,9 @@ void ViewRenderer::run() {
             if (error.code() == ErrorCode::kCancelled) continue;
             const std::lock_guard lock(mutex_);
             error_ = std::current_exception();
-            level = kLevels;
+            level = level_count;
             continue;
         }
-        // A first picture is drawn whole even where the camera has moved on; it is still the
-        // newest.
         if (level == 0) {
             const double factor =
                 std::sqrt(wish.frame_seconds / std::max(frame.stats.seconds, 1e-3));
@@ -109,10 +138,15 @@ void ViewRenderer::run() {
         picture_.view = makeView(request.camera, request.settings.width, request.settings.height,
                                  request.settings.subpixels);
         picture_.image = std::move(frame.image);
+        picture_.cut = std::move(frame.cut);
         picture_.stats = std::move(frame.stats);
         picture_.level = level;
+        picture_.level_count = level_count;
+        picture_.percent = 100.0 * pointsOf(request.settings) / pointsOf(wish.settings);
+        picture_.full_seconds = view_watch.seconds();
         is_new_ = true;
-        level = level == 0 && coarse_scale_ >= 1.0 ? 2 : level + 1;
+        const bool is_full_size = level == 0 && coarse_scale_ >= 1.0 && !wish.sparkles;
+        level = is_full_size ? 2 : level + 1;
     }
 }
 

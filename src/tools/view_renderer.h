@@ -18,19 +18,24 @@ struct ViewWish {
     Camera camera;
     RenderSettings settings;
     double frame_seconds = 0.05;  // target while the camera moves
+    // As FrameRequest has them.
+    bool wants_cut = false, tints_kinds = false;
+    // Refines in place by 1, 10, 50, 75 and 100 % of the points, rather than from coarse to fine.
+    bool sparkles = false;
 };
 
 struct ShownPicture {
-    Image image;  // with depth and object
+    Image image;  // with depth, object and count
+    std::vector<CutBox> cut;
     View view;
     FrameStats stats;
-    int level = 0;  // of kLevels
+    int level = 0, level_count = 0;
+    double percent = 0.0;       // of the points that the finest picture is to have
+    double full_seconds = 0.0;  // since the first of its view was begun
 };
 
 class ViewRenderer {
 public:
-    static constexpr int kLevels = 4;
-
     explicit ViewRenderer(LiveScene& scene);
     ~ViewRenderer();
 
@@ -44,6 +49,7 @@ public:
 private:
     void run();
     RenderSettings settingsOf(const ViewWish& wish, int level) const;
+    static int levelCount(const ViewWish& wish);
 
     LiveScene& scene_;
     std::mutex mutex_;  // guards what follows

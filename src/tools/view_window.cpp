@@ -8,6 +8,7 @@
 #include <scenegraph/pick.h>
 #include <tools/view_camera.h>
 #include <tools/view_history.h>
+#include <tools/view_overlay.h>
 #include <tools/view_renderer.h>
 
 #include <GLFW/glfw3.h>
@@ -99,7 +100,7 @@ private:
     GLFWwindow* handle_ = nullptr;
 };
 
-enum class Mode { kSelect, kPlant };
+enum class Mode { kSelect, kPlant, kBrush };
 
 const char* const kKeys =
     "left drag   orbit about what is under the cursor\n"
@@ -108,9 +109,12 @@ const char* const kKeys =
     "W A S D     fly; Q E down and up; Shift faster\n"
     "1           select: click; drag with Shift moves\n"
     "2           plant: click\n"
+    "3           brush: click plants several\n"
     "Delete      remove what is selected\n"
     "Ctrl+Z, Y   undo, redo\n"
     "Ctrl+S      save; Ctrl+Q quit\n"
+    "O           overlay: cut, points and triangles, points a pixel, depth\n"
+    "P           sparkle in: 1, 10, 50, 75, 100 % of the points\n"
     "F12         screenshot\n"
     "H           this panel";
 
@@ -142,7 +146,8 @@ public:
             if (shows_panel_) drawPanel();
             showPicture();
             if (has_changed_) {
-                renderer_.show({camera_, settings_, 1.0 / options_.frame_rate});
+                renderer_.show({camera_, settings_, 1.0 / options_.frame_rate,
+                                overlay_ == Overlay::kCut, overlay_ == Overlay::kKinds, sparkles_});
                 has_changed_ = false;
             }
             ImGui::Render();
@@ -171,6 +176,8 @@ private:
         if (renderer_.take(picture_)) {
             Image shown = picture_.image;
             applyTone(settings_.tone, shown);
+            applyOverlay(overlay_, picture_, shown);
+            edges_ = cutEdges(picture_);
             rgba_.assign(size_t(shown.width) * size_t(shown.height) * 4, 255);
             for (int y = 0; y < shown.height; ++y) {
                 for (int x = 0; x < shown.width; ++x) {
@@ -192,7 +199,18 @@ private:
         const ImVec2 size = ImGui::GetIO().DisplaySize;
         ImGui::GetBackgroundDrawList()->AddImage(reinterpret_cast<ImTextureID>(uintptr_t(texture_)),
                                                  ImVec2(0, 0), size);
+        if (overlay_ == Overlay::kCut) drawCut();
         if (selected_) drawSelection();
+    }
+
+    void drawCut() const {
+        const ImVec2 size = ImGui::GetIO().DisplaySize;
+        for (const CutEdge& edge : edges_) {
+            const int alpha = int(220.0f - 180.0f * edge.dim);
+            ImGui::GetBackgroundDrawList()->AddLine(ImVec2(edge.a.x * size.x, edge.a.y * size.y),
+                                                    ImVec2(edge.b.x * size.x, edge.b.y * size.y),
+                                                    IM_COL32(255, 230, 60, alpha));
+        }
     }
 
     // What the picture shows under the cursor; none for background.
@@ -253,8 +271,9 @@ private:
 
     void click() {
         const std::optional<Under> under = underCursor();
-        if (mode_ == Mode::kPlant) {
-            if (under) plant(under->point);
+        if (mode_ != Mode::kSelect) {
+            if (under && mode_ == Mode::kPlant) plant({under->point});
+            if (under && mode_ == Mode::kBrush) plant(placesAround(*under));
             return;
         }
         selected_.reset();
@@ -282,16 +301,57 @@ private:
         }
     }
 
-    void plant(const DVec3& at) {
-        if (palette_.empty()) return;
+    // One step, however many they are.
+    void plant(const std::vector<DVec3>& at) {
+        if (palette_.empty() || at.empty()) return;
         const std::string& name = palette_[size_t(planted_)];
         Rng rng{uint64_t(history_.undoable()) + 1};
-        const double angle = rng.uniform(0.0, 2.0 * kPi), scale = rng.uniform(0.8, 1.2);
-        const double c = std::cos(angle) * scale, s = std::sin(angle) * scale;
-        const Affine place = {DMat3(c, 0, -s, 0, scale, 0, s, 0, c), at};
-        tryEdit("planted " + name, [&](SceneEditor& editor) {
-            history_.insert(editor, editor.scene().root, editor.scene().names.at(name), place);
+        std::vector<Affine> places;
+        for (const DVec3& p : at) {
+            const double angle = rng.uniform(0.0, 2.0 * kPi), scale = rng.uniform(0.8, 1.2);
+            const double c = std::cos(angle) * scale, s = std::sin(angle) * scale;
+            places.push_back({DMat3(c, 0, -s, 0, scale, 0, s, 0, c), p});
+        }
+        const std::string count = at.size() == 1 ? "" : std::to_string(at.size()) + " of ";
+        tryEdit("planted " + count + name, [&](SceneEditor& editor) {
+            history_.insert(editor, editor.scene().root, editor.scene().names.at(name), places);
         });
+    }
+
+    // Evenly spread about a point, as high as what the picture shows there; on the level of the
+    // point where it shows something else.
+    std::vector<DVec3> placesAround(const Under& center) const {
+        Rng rng{uint64_t(history_.undoable()) + 1};
+        std::vector<DVec3> places;
+        for (int i = 0; i < brush_count_; ++i) {
+            const double angle = rng.uniform(0.0, 2.0 * kPi),
+                         r = double(brush_radius_) * std::sqrt(rng.uniform(0.0, 1.0));
+            DVec3 p = center.point + r * DVec3(std::cos(angle), 0.0, std::sin(angle));
+            // The ray through the place meets the ground elsewhere unless the ground is level:
+            // a few steps go there.
+            for (int step = 0; step < 4; ++step) {
+                const std::optional<DVec3> seen = shownAt(p);
+                if (!seen || std::abs(seen->y - center.point.y) > double(brush_radius_)) break;
+                p.y = seen->y;
+            }
+            places.push_back(p);
+        }
+        return places;
+    }
+
+    // What the picture shows in the direction of a point.
+    std::optional<DVec3> shownAt(const DVec3& p_world) const {
+        const View& view = picture_.view;
+        const DVec3 p = DMat3(view.camera_from_world) * (p_world - view.eye_world);
+        if (p.z <= 0.0) return std::nullopt;
+        const double scale = view.orthographic ? view.focal : view.focal / p.z;
+        const Image& image = picture_.image;
+        const double x = (view.center_x + p.x * scale) / view.subpixels,
+                     y = (view.center_y + p.y * scale) / view.subpixels;
+        if (!(x >= 0.0 && y >= 0.0 && x < image.width && y < image.height)) return std::nullopt;
+        const float depth = image.pixel(int(x), int(y))[image.channelIndex("depth")];
+        if (!std::isfinite(depth)) return std::nullopt;
+        return worldPoint(view, int(x), int(y), double(depth));
     }
 
     // To where it was let go.
@@ -331,6 +391,15 @@ private:
         }
         if (isPressed(GLFW_KEY_1)) mode_ = Mode::kSelect;
         if (isPressed(GLFW_KEY_2)) mode_ = Mode::kPlant;
+        if (isPressed(GLFW_KEY_3)) mode_ = Mode::kBrush;
+        if (isPressed(GLFW_KEY_O)) {
+            overlay_ = Overlay((int(overlay_) + 1) % kOverlayCount);
+            has_changed_ = true;
+        }
+        if (isPressed(GLFW_KEY_P)) {
+            sparkles_ = !sparkles_;
+            has_changed_ = true;
+        }
         if (isPressed(GLFW_KEY_H)) shows_panel_ = !shows_panel_;
         if (isPressed(GLFW_KEY_F12)) screenshot();
         if (isPressed(GLFW_KEY_DELETE) && selected_) {
@@ -344,8 +413,9 @@ private:
             status_ = "only scene files can be saved";
             return;
         }
-        tryEdit("saved " + options_.save_path,
-                [&](SceneEditor& editor) { saveScene(editor.scene(), options_.save_path); });
+        tryEdit("saved " + options_.save_path, [&](SceneEditor& editor) {
+            saveScene(editor.scene(), editor.addedAssets(), options_.save_path);
+        });
     }
 
     void screenshot() {
@@ -353,6 +423,7 @@ private:
         try {
             Image shown = picture_.image;
             applyTone(settings_.tone, shown);
+            applyOverlay(overlay_, picture_, shown);
             saveImage(shown, options_.screenshot_path);
             status_ = "wrote " + options_.screenshot_path;
         } catch (const Error& error) {
@@ -378,7 +449,14 @@ private:
         ImGui::RadioButton("select (1)", &mode, int(Mode::kSelect));
         ImGui::SameLine();
         ImGui::RadioButton("plant (2)", &mode, int(Mode::kPlant));
+        ImGui::SameLine();
+        ImGui::RadioButton("brush (3)", &mode, int(Mode::kBrush));
         mode_ = Mode(mode);
+        if (mode_ == Mode::kBrush) {
+            ImGui::SliderFloat("metres about the click", &brush_radius_, 1.0f, 200.0f, "%.0f",
+                               ImGuiSliderFlags_Logarithmic);
+            ImGui::SliderInt("plants", &brush_count_, 1, 500, "%d", ImGuiSliderFlags_Logarithmic);
+        }
         if (!palette_.empty() && ImGui::BeginCombo("asset", palette_[size_t(planted_)].c_str())) {
             for (int i = 0; i < int(palette_.size()); ++i) {
                 if (ImGui::Selectable(palette_[size_t(i)].c_str(), i == planted_)) planted_ = i;
@@ -399,12 +477,21 @@ private:
         }
         has_changed_ |= ImGui::SliderInt("subpixels", &settings_.subpixels, 1, 8);
         has_changed_ |= ImGui::Checkbox("shadows", &settings_.shadows);
+        int overlay = int(overlay_);
+        if (ImGui::Combo("overlay (O)", &overlay, kOverlayNames, kOverlayCount)) {
+            overlay_ = Overlay(overlay);
+            has_changed_ = true;
+        }
+        has_changed_ |= ImGui::Checkbox("sparkle in (P)", &sparkles_);
         ImGui::SliderFloat("metres a second", &pace_, 1.0f, 1000.0f, "%.0f",
                            ImGuiSliderFlags_Logarithmic);
         ImGui::Separator();
         const FrameStats& stats = picture_.stats;
-        ImGui::Text("picture %d of %d: %d x %d, %.0f ms", picture_.level + 1, ViewRenderer::kLevels,
-                    picture_.image.width, picture_.image.height, stats.seconds * 1e3);
+        ImGui::Text("picture %d of %d, %.3g %% of the points: %d x %d, %.0f ms", picture_.level + 1,
+                    picture_.level_count, picture_.percent, picture_.image.width,
+                    picture_.image.height, stats.seconds * 1e3);
+        ImGui::Text("%.2f s after the last change", picture_.full_seconds);
+        ImGui::Text("overestimation %.2f", stats.overestimation);
         ImGui::Text("%.2f million points drawn, %.2f kept", double(stats.points_drawn) * 1e-6,
                     double(stats.points_kept) * 1e-6);
         ImGui::Text("%.2f million small triangles, %llu large",
@@ -434,6 +521,11 @@ private:
     std::vector<uint8_t> rgba_;
     Mode mode_ = Mode::kSelect;
     int planted_ = 0;
+    float brush_radius_ = 15.0f;  // m
+    int brush_count_ = 20;
+    Overlay overlay_ = Overlay::kNone;
+    std::vector<CutEdge> edges_;
+    bool sparkles_ = false;
     std::optional<Under> grabbed_;
     float dragged_ = 0.0f;
     std::optional<InstanceId> selected_;

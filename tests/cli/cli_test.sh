@@ -698,6 +698,49 @@ JSON
     expect_ok compare b.png c.png --fail-below 45
 }
 
+# Assets that come while the scene is looked at are in what is saved, and it looks the same.
+case_edit_asset() {
+    write_edit_scene
+    expect_ok generate rock --count 300 -o rock.glb
+    mkdir scene && cp rock.glb scene && mv edit.scene.json scene
+    cat >edits.jsonl <<JSON
+{"do": "asset", "name": "rock", "file": "rock.glb", "scale": 3}
+{"do": "asset", "name": "oak", "generate": "tree", "species": "oak", "triangles": 2000, "height": 8}
+{"do": "render", "output": "before.png"}
+{"do": "insert", "child": "rock", "translation": [6, 2, 1]}
+{"do": "insert", "child": "oak", "group": "balls", "translation": [-6, 0, 1]}
+{"do": "render", "output": "a.png"}
+{"do": "save", "output": "scene/saved.scene.json"}
+JSON
+    expect_ok edit scene/edit.scene.json --script edits.jsonl "${small[@]}" --stats stats.json --quiet
+    grep -q '"asset": {' stats.json || fail "no times"
+    cmp -s before.png a.png && fail "the assets are not seen"
+    expect_ok render scene/saved.scene.json -o b.png "${small[@]}" --quiet
+    expect_ok compare a.png b.png --fail-below 45
+    # What cannot be is told, with the line, and changes nothing.
+    cat >edits.jsonl <<JSON
+{"do": "asset", "file": "rock.glb"}
+{"do": "asset", "name": "ball", "file": "rock.glb"}
+{"do": "asset", "name": "a", "file": "none.glb"}
+{"do": "asset", "name": "b", "generate": "tree", "species": "oka"}
+{"do": "asset", "name": "c", "generate": "tree", "triangle": 5}
+{"do": "asset", "name": "d", "file": "../rock.glb"}
+{"do": "asset", "name": "e"}
+{"do": "asset", "name": "f", "file": "edit.scene.json"}
+{"do": "insert", "child": "a"}
+{"do": "save", "output": "scene/again.scene.json"}
+JSON
+    "$stipple" edit scene/edit.scene.json --script edits.jsonl --quiet >stdout.txt 2>stderr.txt
+    [[ $? == 3 ]] || fail "exit code"
+    [[ $(wc -l <stderr.txt) == 9 ]] || fail "not a line for each error"
+    for line in 'line 1: needs "name"' 'line 2: /name: .*already' 'line 3: /file: ' 'line 4: /species: ' 'line 5: ' \
+        'line 6: /file: ' 'line 7: ' 'line 8: /file: ' 'line 9: /child: '; do
+        grep -qE "edits.jsonl: $line" stderr.txt || fail "no such error: $line"
+    done
+    grep -q '"a"' scene/again.scene.json && fail "an asset that could not be loaded was saved"
+    [[ -s scene/again.scene.json ]] || fail "not saved"
+}
+
 case_edit_file_errors() {
     write_edit_scene
     with_edits() { sed "s|\"root\": \"all\"|\"root\": \"all\", \"edits\": $1|" edit.scene.json >bad.scene.json; }

@@ -283,13 +283,14 @@ TEST(SceneEditor, cachedPointsFollow) {
     SceneEditor editor(scene);
     PointLists lists(scene);
     ASSERT_TRUE(lists.hasLists(ChildRef::group(1)));
+    ThreadPool pool(2);
     const ListIdentity identity;
     Rng rng{13};
     std::vector<InstanceId> alive = idsOf(scene, 1);
     for (int round = 0; round < 20; ++round) {
-        lists.startFrame(identity, size_t(64) << 20);
+        lists.startFrame(identity, size_t(64) << 20, pool);
         PointLists fresh(scene);
-        fresh.startFrame(identity, 0);
+        fresh.startFrame(identity, 0, pool);
         size_t compared = 0;
         for (uint32_t node = 0; node < scene.groups[1].nodes.size(); ++node) {
             if (!(scene.groups[1].nodes[node].area > 0.0)) continue;

@@ -75,6 +75,26 @@ xdotool mousemove 170 190 sleep 0.5 click 1
 sleep 2
 key Delete
 shot removed.png differs redone.png
+# The brush plants several in one step.
+key 3
+xdotool mousemove 330 260 sleep 0.5 click 1
+sleep 2
+shot brushed.png differs removed.png
+key ctrl+z
+shot unbrushed.png equals removed.png
+key 1
+# Overlays, one after the other, and none again; the cut is drawn over the picture, not in screenshots.
+for overlay in cut kinds counts depths; do
+    key o
+    [[ $overlay == cut ]] || shot $overlay.png differs removed.png
+done
+cmp -s kinds.png counts.png && fail "overlays are alike"
+key o
+shot plain.png equals removed.png
+# Sparkling in ends where the other way ends.
+key p
+shot sparkled.png equals removed.png
+key p
 # Orbit, and back again.
 xdotool mousemove 240 250 mousedown 1
 xdotool mousemove 300 250
