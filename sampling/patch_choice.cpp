@@ -11,7 +11,7 @@ namespace {
 
 // Where patches have no more than so many subpixels of the model's square, points on the mesh as a
 // whole cost less, measured: lists of what is visible have fewer of them.
-constexpr float kSubpixelsPerPatch = 320.0f;
+constexpr float kSubpixelsPerPatch = 96.0f;
 constexpr float kMostError = 0.5f;  // subpixels
 // Of coarser triangles none may be left to the z-buffer, which knows only the finest.
 constexpr double kBelowLarge = 0.9;
