@@ -5,7 +5,7 @@
 // 2002.
 #pragma once
 
-#include <core/camera.h>
+#include <core/points.h>
 
 #include <algorithm>
 #include <cmath>
@@ -20,6 +20,10 @@ struct Variance {
     Variance plus(float variance) const { return {xx + variance, xy, yy + variance}; }
     Variance times(float scale) const { return {xx * scale, xy * scale, yy * scale}; }
     float determinant() const { return xx * yy - xy * xy; }
+    // d^T v^-1 d.
+    float measure(const Vec2& d) const {
+        return (yy * d.x * d.x - 2.0f * xy * d.x * d.y + xx * d.y * d.y) / determinant();
+    }
 };
 
 struct Ellipse {
@@ -35,10 +39,9 @@ struct Ellipse {
     static constexpr float kEdgeOn = 0.1f;
 };
 
-// p, n: centre and unit normal in camera space.
-inline Ellipse makeEllipse(const View& view, const Vec3& p, Vec3 n) {
-    Ellipse e;
-    e.center = view.project(p);
+// A plane that is seen too edge-on turned towards the eye. n: unit; becomes the side that faces
+// away.
+inline void turnToEye(const View& view, const Vec3& p, Vec3& n, Ellipse& e) {
     const Vec3 ray = view.orthographic ? Vec3(0, 0, 1) : p / glm::length(p);
     float cosine = glm::dot(n, ray);
     if (cosine < 0.0f) n = -n, cosine = -cosine;
@@ -47,9 +50,13 @@ inline Ellipse makeEllipse(const View& view, const Vec3& p, Vec3 n) {
         cosine = glm::dot(n, ray);
     }
     e.cosine = cosine;
-    const Vec3 s =
-        glm::normalize(std::abs(n.z) > std::abs(n.x) ? Vec3(0, n.z, -n.y) : Vec3(-n.y, n.x, 0));
-    const Vec3 t = glm::cross(n, s);
+}
+
+// The ellipse around p in the plane of the unit normal n whose half axes (for affine images of a
+// circle: conjugate ones) are s and t, m.
+inline void projectEllipse(const View& view, const Vec3& p, const Vec3& n, const Vec3& s,
+                           const Vec3& t, Ellipse& e) {
+    e.center = view.project(p);
     const float f = float(view.focal);
     Vec2 js, jt;
     if (view.orthographic) {
@@ -66,8 +73,54 @@ inline Ellipse makeEllipse(const View& view, const Vec3& p, Vec3 n) {
         e.slope = Vec2(n.x, n.y) / (f * d);
     }
     e.unit = {js.x * js.x + jt.x * jt.x, js.x * js.y + jt.x * jt.y, js.y * js.y + jt.y * jt.y};
+}
+
+// Of a circle. p, n: centre and unit normal in camera space.
+inline Ellipse makeEllipse(const View& view, const Vec3& p, Vec3 n) {
+    Ellipse e;
+    turnToEye(view, p, n, e);
+    const Vec3 s =
+        glm::normalize(std::abs(n.z) > std::abs(n.x) ? Vec3(0, n.z, -n.y) : Vec3(-n.y, n.x, 0));
+    projectEllipse(view, p, n, s, glm::cross(n, s), e);
     return e;
 }
+
+// Of a disc with a shape of its own, whose plane is that of its axes.
+inline Ellipse makeEllipse(const View& view, const Vec3& p, const DiscShape& shape) {
+    Ellipse e;
+    Vec3 n = glm::normalize(glm::cross(shape.axis[0], shape.axis[1]));
+    turnToEye(view, p, n, e);
+    projectEllipse(view, p, n, shape.axis[0] - n * glm::dot(n, shape.axis[0]),
+                   shape.axis[1] - n * glm::dot(n, shape.axis[1]), e);
+    return e;
+}
+
+// Where a disc with cuts has surface in the picture.
+class CutTest {
+public:
+    CutTest(const View& view, const Vec3& p, const DiscShape& shape)
+        : view_(view), p_(p), shape_(shape) {
+        if (shape.n_cuts == 0) return;
+        const Vec3 n = glm::cross(shape.axis[0], shape.axis[1]);
+        const float squared = glm::dot(n, n);
+        across_[0] = glm::cross(shape.axis[1], n) / squared;
+        across_[1] = glm::cross(n, shape.axis[0]) / squared;
+    }
+    // x, y: subpixel coordinates; depth: of the disc's plane there.
+    bool hasSurface(float x, float y, float depth) const {
+        if (shape_.n_cuts == 0) return true;
+        Vec3 origin, direction;
+        view_.ray(x, y, origin, direction);
+        const Vec3 d = origin + direction * depth - p_;
+        return shape_.hasSurface(glm::dot(d, across_[0]), glm::dot(d, across_[1]));
+    }
+
+private:
+    const View& view_;
+    const Vec3 p_;
+    const DiscShape& shape_;
+    std::array<Vec3, 2> across_ = {};  // u and v of an offset
+};
 
 // Depth of the plane there; the centre's where the plane is not in front of the eye.
 inline float planeDepth(const View& view, const Ellipse& e, const Vec2& d) {

@@ -21,6 +21,7 @@ constexpr float kLeastRadius = 0.71f;
 constexpr float kSplatSigma = 0.5f;
 // A patch at least this many discs wide is a surface.
 constexpr float kWideInDiscs = 3.0f;
+const DiscShape kCircle;  // without cuts
 
 struct Gathered {
     Vec3 albedo = Vec3(0), normal = Vec3(0);
@@ -129,6 +130,7 @@ private:
         return Vec3(block.x[i], block.y[i], block.z[i]);
     }
     Ellipse ellipseOf(const PointBlock& block, int i) const {
+        if (block.shapes) return makeEllipse(context_.view, position(block, i), block.shapes[i]);
         return makeEllipse(context_.view, position(block, i),
                            Vec3(block.normal_x[i], block.normal_y[i], block.normal_z[i]));
     }
@@ -148,11 +150,14 @@ private:
         const SubpixelRect& rect = front_.rect();
         const Variance v =
             e.unit.times(areaOf(block, i, e) * (kDiscArea / kPi)).plus(kLeastRadius * kLeastRadius);
+        const CutTest cut(context_.view, position(block, i),
+                          block.shapes ? block.shapes[i] : kCircle);
         visitEllipse(e.center, v, 1.0f, rect.x0, rect.y0, rect.x1, rect.y1,
                      [&](int x, int y, const Vec2& d, float) {
+                         const float depth = planeDepth(context_.view, e, d);
+                         if (!cut.hasSurface(e.center.x + d.x, e.center.y + d.y, depth)) return;
                          uint64_t& key = front_.row(y)[x];
-                         const uint64_t of_disc =
-                             pointKey(block, i, planeDepth(context_.view, e, d));
+                         const uint64_t of_disc = pointKey(block, i, depth);
                          is_used |= of_disc < key;
                          key = std::min(key, of_disc);
                      });
@@ -204,12 +209,19 @@ private:
         const Variance v = e.unit.times(kSplatSigma * kSplatSigma * world_area).plus(prefilter_);
         const float area = world_area * std::sqrt(std::max(e.unit.determinant(), 0.0f));
         const float scale = area / kernelIntegral(v);
+        const Variance disc = e.unit.times(world_area * (kDiscArea / kPi));
+        const CutTest cut(context_.view, position(block, i),
+                          block.shapes ? block.shapes[i] : kCircle);
         visitEllipse(e.center, v, kKernelEnd, inner_.x0, inner_.y0, inner_.x1, inner_.y1,
                      [&](int x, int y, const Vec2& d, float r) {
-                         if (!isOnFront(planeDepth(context_.view, e, d), front_.row(y)[x], code))
+                         const float depth = planeDepth(context_.view, e, d);
+                         if (!isOnFront(depth, front_.row(y)[x], code) ||
+                             !cut.hasSurface(e.center.x + d.x, e.center.y + d.y, depth))
                              return;
                          const float w = scale * kernel(r);
-                         add(x, y, e.center, w, w);
+                         // Discs with shapes end where the surface does.
+                         const bool is_surface = block.shapes && disc.measure(d) < 1.0f;
+                         add(x, y, e.center, w, is_surface ? 1.0f : w);
                      });
     }
 

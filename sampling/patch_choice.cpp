@@ -9,8 +9,9 @@ namespace stipple {
 
 namespace {
 
-// A patch's coarsest surfels are worth about so many subpixels of the model's square.
-constexpr float kSubpixelsPerPatch = 32.0f;
+// Where patches have no more than so many subpixels of the model's square, points on the mesh as a
+// whole cost less, measured: lists of what is visible have fewer of them.
+constexpr float kSubpixelsPerPatch = 96.0f;
 constexpr float kMostError = 0.5f;  // subpixels
 // Of coarser triangles none may be left to the z-buffer, which knows only the finest.
 constexpr double kBelowLarge = 0.9;

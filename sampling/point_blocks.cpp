@@ -399,7 +399,8 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
         std::vector<Surfel> surfels;
         for (const Sample& s : levels[l])
             surfels.push_back({s.position, s.normal, s.albedo, index_of.at(s.finish_key), 1.0f});
-        SurfelLevel level = packSurfels(std::move(surfels), model.finishes, pixel, false);
+        SurfelLevel level =
+            packSurfels(std::move(surfels), model.finishes, pixel, SurfelDiscs::kAlike);
         builder.findMasks(pixel, level);
         // From about the centre to where the source is.
         for (SurfelBlock& block : level.blocks) {

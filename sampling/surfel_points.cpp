@@ -16,6 +16,28 @@ constexpr float kFewSubpixels = 3.0f;
 // A model whose coarsest level is finer than this share of what is wanted is far.
 constexpr float kFarShare = 0.5f;
 
+// Of a block's discs, object space, m: sides of squares as large, and the longest extent.
+struct BlockSides {
+    float smallest = 0.0f, largest = 0.0f, longest = 0.0f;
+};
+
+BlockSides sidesOf(const SurfelLevel& level, const SurfelBlock& block) {
+    if (level.radius.empty()) return {level.spacing, level.spacing, level.spacing};
+    BlockSides sides;
+    uint8_t least = 255, most = 0;
+    for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+        const uint8_t code = level.radius[i];
+        least = std::min(least, code), most = std::max(most, code);
+        if (level.shapes.empty()) continue;
+        const float ratio = float(level.shapes[i].ratio) / 255.0f;
+        sides.longest = std::max(sides.longest, surfelRadius(code) / std::sqrt(ratio));
+    }
+    sides.smallest = level.spacing * surfelRadius(least);
+    sides.largest = level.spacing * surfelRadius(most);
+    sides.longest = std::max(sides.longest * level.spacing, sides.largest);
+    return sides;
+}
+
 // Subpixels that a ball touches, clipped to nothing; all of the region where it reaches the eye.
 SubpixelRect ballRect(const View& view, const Vec3& c, float r, const SubpixelRect& region) {
     const float f = float(view.focal);
@@ -36,6 +58,23 @@ SubpixelRect ballRect(const View& view, const Vec3& c, float r, const SubpixelRe
             int(std::ceil(bounded(float(view.center_y) + f * high(c.y + r)))) + 1};
 }
 
+// radius: of a circle as large, object space. area: what a unit of area in its plane becomes.
+DiscShape shapeOf(const Surfel& s, float radius, const Mat3& linear, float& area) {
+    const std::array<Vec3, 2> axes = s.axes();
+    DiscShape shape;
+    for (size_t k = 0; k < 2; ++k) shape.axis[k] = linear * axes[k];
+    area = glm::length(glm::cross(shape.axis[0], shape.axis[1]));
+    const float scale = std::sqrt(std::max(area, 1e-30f));
+    for (Vec3& axis : shape.axis) axis /= scale;
+    shape.n_cuts = s.n_cuts;
+    // Along the long half axis u goes from -radius to radius, across it v does.
+    for (int i = 0; i < s.n_cuts; ++i) {
+        const Vec3& cut = s.cuts[size_t(i)];
+        shape.cuts[size_t(i)] = Vec3(cut.x, cut.y * s.ratio, cut.z * radius * scale);
+    }
+    return shape;
+}
+
 }  // namespace
 
 // One level of one instance.
@@ -48,6 +87,7 @@ struct SurfelPoints::Placed {
     float length_scale = 1.0f;
     std::array<int, 256> width_codes = {};  // of finishes, in metres of camera space
     int first_material = 0;
+    bool blends_coarse = false;  // surfels coarser than the view asks for, by ewa
 };
 
 bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z_min) {
@@ -64,21 +104,30 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     int l = n_levels - 1;
     while (l > 0 && model.levels[size_t(l)].spacing * per_metre > wanted) --l;
     const SurfelLevel& level = model.levels[size_t(l)];
-    Placed placed{frame, model, level, mesh_index, l, scale, {}, int(mesh.first_finish)};
+    const bool may_be_discs = !context_.sink->wantsSurfels();
+    Placed placed{frame,
+                  model,
+                  level,
+                  mesh_index,
+                  l,
+                  scale,
+                  {},
+                  int(mesh.first_finish),
+                  !may_be_discs && level.spacing * per_metre > wanted};
     for (size_t i = 0; i < model.finishes.size(); ++i) {
         placed.width_codes[i] =
             int(patchWidthCode(model.finishes[i].patch_width * scale, kFirstMetreExponent));
     }
-    const bool with_discs =
-        !context_.sink->wantsSurfels() && level.spacing * per_metre > std::max(1.0f, wanted);
-    // Discs seen edge on cover no subpixel: their middles do.
-    const bool with_points = !with_discs || level.spacing * per_metre < kFewSubpixels;
     const float reach = float(maxLengthScale(frame.camera_from_object.linear));
     const SubpixelRect& region = context_.sink->region();
     for (const SurfelBlock& block : level.blocks) {
         const Vec3 center(frame.camera_from_object.point(DVec3(block.bounds.center())));
+        const BlockSides sides = sidesOf(level, block);
+        const bool with_discs = may_be_discs && sides.largest * per_metre > std::max(1.0f, wanted);
+        // Discs seen edge on cover no subpixel: their middles do.
+        const bool with_points = !with_discs || sides.smallest * per_metre < kFewSubpixels;
         float radius = 0.5f * glm::length(block.bounds.extent()) * reach;
-        if (with_discs) radius += model.discSide() * level.spacing * scale * 4.0f;
+        if (with_discs || !may_be_discs) radius += model.discSide() * sides.longest * reach;
         if (center.z + radius <= view.near_z || center.z - radius > view.far_z) continue;
         const SubpixelRect rect = ballRect(view, center, radius, region);
         if (!rect.overlaps(region) || isHiddenFromEye(frame, model, block)) continue;
@@ -112,7 +161,7 @@ bool SurfelPoints::isHiddenFromEye(const InstanceFrame& frame, const SurfelModel
     return !(block.visible_from[size_t(d / 64)] >> (d % 64) & 1);
 }
 
-uint32_t SurfelPoints::addRun(const Placed& placed, uint32_t first, bool is_disc) {
+uint32_t SurfelPoints::addRun(const Placed& placed, uint32_t first, int numbers_shift) {
     const uint32_t number = context_.nextNumber();
     Run run;
     run.camera_from_normal = placed.frame.camera_from_normal;
@@ -121,7 +170,7 @@ uint32_t SurfelPoints::addRun(const Placed& placed, uint32_t first, bool is_disc
     run.first_index = first;
     run.path = placed.frame.path;
     run.surfel_level = int16_t(placed.level_index);
-    run.surfels_per_number_shift = is_disc ? 1 : 0;
+    run.numbers_per_surfel_shift = uint8_t(numbers_shift);
     context_.runs.push_back(run);
     return number;
 }
@@ -150,7 +199,7 @@ void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
         out.z[i] = z;
         out.keep[i] = uint8_t((z > z_near) & (z <= z_far));
     }
-    const uint32_t number = addRun(placed, b.first, false);
+    const uint32_t number = addRun(placed, b.first, 0);
     for (int i = 0; i < n; ++i) out.number[i] = number + uint32_t(i);
     const bool with_shapes = context_.sink->wantsSurfels();
     if (with_shapes || !placed.model.leaves_no_holes) {
@@ -170,9 +219,10 @@ void SurfelPoints::addWidths(const Placed& placed, const SurfelBlock& b) {
     const float z = view.orthographic ? 1.0f : std::max(center.z, view.near_z);
     const int offset = int(std::lround(std::log2(float(view.focal) / z) * kWidthsPerOctave)) +
                        (kFirstMetreExponent - kFirstSubpixelExponent) * kWidthsPerOctave;
-    // There are one to two of a grid's samples a subpixel: on wider patches than those whose holes
-    // are closed they would widen silhouettes.
-    const int widest = placed.model.leaves_no_holes ? kWidthCodes - 1 : int(kSurfaceCode);
+    // Where there are one to two of a grid's samples a subpixel, on wider patches than those whose
+    // holes are closed they would widen silhouettes.
+    const int widest =
+        placed.model.leaves_no_holes || placed.blends_coarse ? kWidthCodes - 1 : int(kSurfaceCode);
     for (int i = 0; i < block_.count; ++i) {
         const int code =
             placed.width_codes[placed.level.albedo_finish[b.first + uint32_t(i)] >> 24];
@@ -180,12 +230,14 @@ void SurfelPoints::addWidths(const Placed& placed, const SurfelBlock& b) {
     }
 }
 
-// Its normals and areas.
+// Its normals, areas and shapes.
 void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
     const SurfelLevel& level = placed.level;
     // Discs with radii of their own cover all of the surface between them; what blends, less.
     const float side = level.spacing * placed.length_scale * (level.radius.empty() ? 1.0f : 0.5f);
+    const Mat3 linear(placed.frame.camera_from_object.linear);
     PointBlock& out = block_;
+    out.shapes = level.shapes.empty() ? nullptr : shapes_.data();
     for (int i = 0; i < out.count; ++i) {
         const uint32_t k = b.first + uint32_t(i);
         const Vec3 normal =
@@ -193,39 +245,54 @@ void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
         out.normal_x[i] = normal.x, out.normal_y[i] = normal.y, out.normal_z[i] = normal.z;
         const float share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[k]);
         out.area[i] = side * side * share * share;
+        if (out.shapes) {
+            const Surfel s = unpackSurfel(level, b, k);
+            const float radius = level.spacing * share * placed.model.discSide() / kSidePerRadius;
+            float area = 1.0f;
+            shapes_[size_t(i)] = shapeOf(s, radius, linear, area);
+            out.area[i] = 0.25f * level.spacing * level.spacing * share * share * area;
+        }
     }
 }
 
-// Squares that stand for discs, two triangles each.
+// Polygons that stand for discs.
 void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
     const SurfelLevel& level = placed.level;
     const Affine& to_camera = placed.frame.camera_from_object;
     const Mat3 linear(to_camera.linear);
     const View& view = context_.view;
     TriangleBlock& out = triangles_;
-    constexpr uint32_t kDiscs = kBlockPoints / 2;
-    for (uint32_t first = b.first; first < b.first + b.count; first += kDiscs) {
-        const uint32_t end = std::min(first + kDiscs, b.first + b.count);
+    std::array<Vec3, kMostDiscCorners> corners;
+    // Of a square two triangles, of a hexagon four, of one with cuts up to eight.
+    const auto shiftOf = [&](uint32_t k) {
+        return level.shapes.empty() ? 1 : level.shapes[k].n_cuts == 0 ? 2 : 3;
+    };
+    for (uint32_t first = b.first; first < b.first + b.count;) {
+        const int shift = shiftOf(first);
         out.count = 0;
         out.mask = nullptr;
         out.is_wide = false;
-        for (uint32_t k = first; k < end; ++k) {
+        uint32_t k = first;
+        for (; k < b.first + b.count && shiftOf(k) == shift &&
+               out.count + (1 << shift) <= kBlockPoints;
+             ++k) {
             const Surfel s = unpackSurfel(level, b, k);
             const Vec3 center(to_camera.point(DVec3(s.position)));
-            const Vec3 other = std::abs(s.normal.x) < 0.7f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
-            const float half = 0.5f * placed.model.discSide() * level.spacing * s.radius_share;
-            const Vec3 a_object = glm::normalize(glm::cross(s.normal, other)) * half;
-            const Vec3 a = linear * a_object, c = linear * glm::cross(s.normal, a_object);
-            Vec3 corners[4] = {center - a - c, center + a - c, center + a + c, center + c - a};
-            for (const Vec3& corner : corners) {
-                // Before the eye, or not at all.
-                if (corner.z > view.near_z) continue;
-                for (Vec3& q : corners) q = Vec3(0, 0, view.near_z * 2.0f);
-                break;
+            const int n = discPolygon(
+                level, s, placed.model.discSide() * level.spacing * s.radius_share, corners);
+            bool is_in_front = true;
+            for (int c = 0; c < n; ++c) {
+                corners[size_t(c)] = center + linear * corners[size_t(c)];
+                is_in_front = is_in_front && corners[size_t(c)].z > view.near_z;
             }
-            for (const int t : {0, 1}) {
+            for (int t = 0; t < 1 << shift; ++t) {
+                // Before the eye, or not at all.
+                const bool is_there = is_in_front && t + 2 < n;
+                const Vec3 nowhere(0, 0, view.near_z * 2.0f);
+                const Vec3 vertices[3] = {is_there ? corners[0] : nowhere,
+                                          is_there ? corners[size_t(t) + 1] : nowhere,
+                                          is_there ? corners[size_t(t) + 2] : nowhere};
                 const int i = out.count++;
-                const Vec3 vertices[3] = {corners[0], corners[1 + t], corners[2 + t]};
                 for (int m = 0; m < 3; ++m) {
                     out.x[m][i] = vertices[m].x;
                     out.y[m][i] = vertices[m].y;
@@ -237,8 +304,9 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
             out.is_wide =
                 out.is_wide || width >= kSurfaceWidth * (view.orthographic ? 1.0f : center.z);
         }
-        out.first_number = addRun(placed, first, true) | kTriangleBit;
+        out.first_number = addRun(placed, first, shift) | kTriangleBit;
         if (!context_.sink->take(out)) context_.runs.pop_back();
+        first = k;
     }
 }
 

@@ -27,11 +27,12 @@ private:
     void addWidths(const Placed& placed, const SurfelBlock& block);
     void addShapes(const Placed& placed, const SurfelBlock& block);
     void drawDiscs(const Placed& placed, const SurfelBlock& block);
-    uint32_t addRun(const Placed& placed, uint32_t first, bool is_disc);
+    uint32_t addRun(const Placed& placed, uint32_t first, int numbers_shift);
 
     TileContext& context_;
     PointBlock block_;
     TriangleBlock triangles_;
+    std::array<DiscShape, kBlockPoints> shapes_;
 };
 
 // Attributes of a surfel of a run (Run::surfel_level).

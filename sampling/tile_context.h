@@ -25,7 +25,7 @@ struct Run {
     uint64_t path = 0;                        // of the mesh's or the group's instance
     uint32_t triangle_frame = kNotTriangles;  // index into triangle_frames
     int16_t surfel_level = -1;                // of a prebuilt model's surfels, from first_index on
-    uint8_t surfels_per_number_shift = 0;  // 1: a surfel has two numbers, of its disc's triangles
+    uint8_t numbers_per_surfel_shift = 0;  // 1: a surfel has two numbers, of its disc's triangles
 };
 
 struct TileContext {

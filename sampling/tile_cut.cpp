@@ -39,7 +39,7 @@ void TileCut::emit(const Batch& batch, PointSink& sink) {
 void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample) const {
     const Run& run = context_.runOf(number);
     if (run.surfel_level >= 0) {
-        const uint32_t place = (number % kBlockPoints) >> run.surfels_per_number_shift;
+        const uint32_t place = (number % kBlockPoints) >> run.numbers_per_surfel_shift;
         surfelAttributes(context_.scene, context_.view, run, run.first_index + place, sample);
         return;
     }

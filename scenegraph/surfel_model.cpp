@@ -65,6 +65,10 @@ uint8_t surfelRadiusCode(float share) {
     return uint8_t(std::clamp(std::ceil(code), 1.0f, 255.0f));  // never smaller than asked for
 }
 
+float quantizedRatio(float ratio) {
+    return std::clamp(std::round(ratio * 255.0f), 1.0f, 255.0f) / 255.0f;
+}
+
 Vec3 maskDirectionOf(int index) { return maskTable().middles[size_t(index)]; }
 
 int maskDirectionIndex(const Vec3& direction) {
@@ -93,7 +97,8 @@ size_t SurfelModel::bytes() const {
     size_t sum = sizeof(SurfelModel) + finishes.size() * sizeof(SurfelFinish);
     for (const SurfelLevel& level : levels) {
         sum += level.blocks.size() * sizeof(SurfelBlock) + level.radius.size() +
-               level.size() * (2 * sizeof(uint32_t) + sizeof(uint16_t));
+               level.size() * (2 * sizeof(uint32_t) + sizeof(uint16_t)) +
+               level.shapes.size() * sizeof(SurfelShape) + level.cuts.size() * sizeof(SurfelCut);
     }
     return sum;
 }
@@ -131,6 +136,53 @@ void makeCone(const std::vector<Surfel>& surfels, size_t begin, size_t end, Surf
 
 namespace {
 
+constexpr float kNormalSteps = 65535.0f, kTurn = 2.0f * float(kPi) / 65536.0f, kCutSteps = 32767.0f;
+
+// Of a vector in a plane, from `along` towards `across`.
+uint16_t turnOf(float along, float across) {
+    return uint16_t(int(std::lround(std::atan2(across, along) / kTurn)) & 0xffff);
+}
+
+Vec3 unpackNormal32(const std::array<uint16_t, 2>& packed) {
+    return octahedralNormal(float(packed[0]) * (2.0f / kNormalSteps) - 1.0f,
+                            float(packed[1]) * (2.0f / kNormalSteps) - 1.0f);
+}
+
+SurfelShape packShape(const Surfel& s, std::vector<SurfelCut>& cuts) {
+    SurfelShape shape;
+    const Vec2 p = octahedralOf(s.normal);
+    for (int k = 0; k < 2; ++k)
+        shape.normal[size_t(k)] = uint16_t(std::lround((p[k] * 0.5f + 0.5f) * kNormalSteps));
+    Vec3 u, v;
+    tangents(unpackNormal32(shape.normal), u, v);
+    shape.turn = turnOf(glm::dot(s.along, u), glm::dot(s.along, v));
+    shape.ratio = uint8_t(std::lround(quantizedRatio(s.ratio) * 255.0f));
+    shape.n_cuts = uint8_t(s.n_cuts);
+    shape.first_cut = uint32_t(cuts.size());
+    for (int i = 0; i < s.n_cuts; ++i) {
+        const Vec3& cut = s.cuts[size_t(i)];
+        cuts.push_back({turnOf(cut.x, cut.y),
+                        int16_t(std::lround(std::clamp(cut.z, -1.0f, 1.0f) * kCutSteps))});
+    }
+    return shape;
+}
+
+void unpackShape(const SurfelLevel& level, uint32_t index, Surfel& s) {
+    const SurfelShape& shape = level.shapes[index];
+    s.normal = unpackNormal32(shape.normal);
+    Vec3 u, v;
+    tangents(s.normal, u, v);
+    const float turn = float(shape.turn) * kTurn;
+    s.along = u * std::cos(turn) + v * std::sin(turn);
+    s.ratio = float(shape.ratio) / 255.0f;
+    s.n_cuts = shape.n_cuts;
+    for (int i = 0; i < s.n_cuts; ++i) {
+        const SurfelCut& cut = level.cuts[shape.first_cut + uint32_t(i)];
+        const float at = float(cut.turn) * kTurn;
+        s.cuts[size_t(i)] = Vec3(std::cos(at), std::sin(at), float(cut.end) / kCutSteps);
+    }
+}
+
 uint64_t interleave(uint32_t x, uint32_t y, uint32_t z) {
     return spreadBits(x) << 2 | spreadBits(y) << 1 | spreadBits(z);
 }
@@ -138,7 +190,7 @@ uint64_t interleave(uint32_t x, uint32_t y, uint32_t z) {
 }  // namespace
 
 SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
-                        float spacing, bool with_radii) {
+                        float spacing, SurfelDiscs discs) {
     SurfelLevel level;
     level.spacing = spacing;
     Box3 bounds;
@@ -202,7 +254,9 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
             };
             level.albedo_finish.push_back(to8(s.albedo.x) | to8(s.albedo.y) << 8 |
                                           to8(s.albedo.z) << 16 | uint32_t(s.finish) << 24);
-            if (with_radii) level.radius.push_back(surfelRadiusCode(s.radius_share));
+            if (discs != SurfelDiscs::kAlike)
+                level.radius.push_back(surfelRadiusCode(s.radius_share));
+            if (discs == SurfelDiscs::kShapes) level.shapes.push_back(packShape(s, level.cuts));
         }
         level.blocks.push_back(block);
         begin = end;
@@ -222,7 +276,56 @@ Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t
     s.albedo = Vec3(from8(bits), from8(bits >> 8), from8(bits >> 16));
     s.finish = uint8_t(bits >> 24);
     s.radius_share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[i]);
+    if (!level.shapes.empty()) unpackShape(level, i, s);
     return s;
+}
+
+namespace {
+
+// Takes away what lies beyond a line: x u + y v > end.
+int cutPolygon(std::array<Vec2, kMostDiscCorners>& corners, int n, const Vec3& cut, float end) {
+    std::array<Vec2, kMostDiscCorners> kept;
+    int n_kept = 0;
+    const auto beyond = [&](const Vec2& p) { return cut.x * p.x + cut.y * p.y - end; };
+    for (int i = 0; i < n; ++i) {
+        const Vec2 &a = corners[size_t(i)], &b = corners[size_t((i + 1) % n)];
+        const float da = beyond(a), db = beyond(b);
+        if (da <= 0.0f && n_kept < kMostDiscCorners) kept[size_t(n_kept++)] = a;
+        if ((da < 0.0f && db > 0.0f) || (da > 0.0f && db < 0.0f)) {
+            if (n_kept < kMostDiscCorners) kept[size_t(n_kept++)] = a + (b - a) * (da / (da - db));
+        }
+    }
+    corners = kept;
+    return n_kept;
+}
+
+}  // namespace
+
+int discPolygon(const SurfelLevel& level, const Surfel& s, float side,
+                std::array<Vec3, kMostDiscCorners>& corners) {
+    if (level.shapes.empty()) {
+        const Vec3 other = std::abs(s.normal.x) < 0.7f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
+        const Vec3 a = glm::normalize(glm::cross(s.normal, other)) * (0.5f * side),
+                   b = glm::cross(s.normal, a);
+        corners[0] = -a - b, corners[1] = a - b, corners[2] = a + b, corners[3] = b - a;
+        return 4;
+    }
+    const float radius = side / kSidePerRadius, long_axis = radius / std::sqrt(s.ratio),
+                short_axis = long_axis * s.ratio;
+    const float root_3 = std::sqrt(3.0f);
+    std::array<Vec2, kMostDiscCorners> flat;
+    int n = 6;
+    for (int i = 0; i < n; ++i) {
+        const float angle = float(kPi) / 3.0f * float(i);
+        flat[size_t(i)] =
+            Vec2(std::cos(angle) * long_axis, std::sin(angle) * short_axis) * (2.0f / root_3);
+    }
+    for (int i = 0; i < s.n_cuts && n > 0; ++i)
+        n = cutPolygon(flat, n, s.cuts[size_t(i)], s.cuts[size_t(i)].z * long_axis);
+    const Vec3 across = glm::cross(s.normal, s.along);
+    for (int i = 0; i < n; ++i)
+        corners[size_t(i)] = s.along * flat[size_t(i)].x + across * flat[size_t(i)].y;
+    return n;
 }
 
 namespace {
@@ -260,8 +363,15 @@ void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes
     for (const SurfelLevel& level : levels) {
         const size_t n = level.size();
         check(level.normal.size() == n && level.albedo_finish.size() == n &&
-                  (level.radius.empty() || level.radius.size() == n),
+                  (level.radius.empty() || level.radius.size() == n) &&
+                  (level.shapes.empty() || (level.shapes.size() == n && !level.radius.empty())),
               where, "has arrays of different lengths");
+        for (const SurfelShape& shape : level.shapes) {
+            check(shape.ratio > 0, where, "has a splat that is a line");
+            check(shape.n_cuts <= kMostSurfelCuts &&
+                      uint64_t(shape.first_cut) + shape.n_cuts <= level.cuts.size(),
+                  where, "has a splat whose cuts are not there");
+        }
         check(n > 0, where, "has a level without surfels");
         check(level.spacing > 0.0f && level.spacing < 1e15f, where,
               "has a spacing that is no length");

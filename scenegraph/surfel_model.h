@@ -42,15 +42,39 @@ inline uint32_t positionPart(uint32_t packed, int axis) {
     return packed >> kPositionShift[axis] & positionSteps(axis);
 }
 
-// One density: as structure of arrays, 10 bytes a surfel, 11 with radii of their own.
+// The disc of a splat as an ellipse that lines may cut. Its plane is kept more exactly than
+// SurfelLevel::normal has it: large discs would not meet.
+struct SurfelShape {
+    std::array<uint16_t, 2> normal = {0, 0};  // octahedral
+    uint16_t turn = 0;    // to the long half axis, 65536ths of a turn from the normal's tangent
+    uint8_t ratio = 255;  // of the short half axis to the long one, 255ths
+    uint8_t n_cuts = 0;
+    uint32_t first_cut = 0;  // of SurfelLevel::cuts
+};
+static_assert(sizeof(SurfelShape) == 12);
+
+// There is surface up to `end` long half axes (32767ths) in the direction that is `turn` from the
+// long half axis.
+struct SurfelCut {
+    uint16_t turn = 0;
+    int16_t end = 0;
+};
+static_assert(sizeof(SurfelCut) == 4);
+
+inline constexpr int kMostSurfelCuts = 4;
+
+// One density: as structure of arrays, 10 bytes a surfel, 11 with radii of their own, 23 and 4 a
+// cut with shapes.
 struct SurfelLevel {
     float spacing = 1.0f;  // object space, m: no point of the surface is farther from a surfel
     std::vector<SurfelBlock> blocks;
     std::vector<uint32_t> position;  // packed, in steps of the block's extent
     std::vector<uint16_t> normal;    // octahedral, 2 x 8 bits
     std::vector<uint32_t>
-        albedo_finish;            // sRGB-encoded 3 x 8 bits; index of the finish in the top 8
-    std::vector<uint8_t> radius;  // surfelRadius() codes; empty: spacing holds for all
+        albedo_finish;                // sRGB-encoded 3 x 8 bits; index of the finish in the top 8
+    std::vector<uint8_t> radius;      // surfelRadius() codes; empty: spacing holds for all
+    std::vector<SurfelShape> shapes;  // empty: circles; else radii are of circles as large
+    std::vector<SurfelCut> cuts;
 
     size_t size() const { return position.size(); }
     static Vec3 step(const SurfelBlock& block) {
@@ -61,6 +85,8 @@ struct SurfelLevel {
 // Radii in eighths of an octave, as a share of SurfelLevel::spacing.
 inline float surfelRadius(uint8_t code) { return std::exp2((float(code) - 128.0f) * 0.125f); }
 uint8_t surfelRadiusCode(float share);
+// The ratio that SurfelShape keeps of a ratio of half axes.
+float quantizedRatio(float ratio);
 
 // What surfels of one kind share beside their colour.
 struct SurfelFinish {
@@ -99,13 +125,38 @@ struct Surfel {
     Vec3 position = Vec3(0), normal = Vec3(0, 0, 1), albedo = Vec3(0);  // albedo linear
     uint8_t finish = 0;
     float radius_share = 1.0f;  // of the level's spacing
+    // Of shapes: unit, in the plane; short over long half axis; (x, y) a unit vector in the plane,
+    // x along: there is surface up to z long half axes that way.
+    Vec3 along = Vec3(1, 0, 0);
+    float ratio = 1.0f;
+    int n_cuts = 0;
+    std::array<Vec3, kMostSurfelCuts> cuts = {};
+
+    // Half axes of a disc that is as large as a circle of radius 1.
+    std::array<Vec3, 2> axes() const {
+        const float long_axis = 1.0f / std::sqrt(ratio);
+        return {along * long_axis, glm::cross(normal, along) * (ratio * long_axis)};
+    }
 };
 
+// How a level's surfels are kept.
+enum class SurfelDiscs { kAlike, kRadii, kShapes };
+
 // Sorts surfels into blocks of what lies near each other and faces one way, with visibility cones
-// where all finishes of a block are single-sided. with_radii: keep radius_share.
+// where all finishes of a block are single-sided.
 SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
-                        float spacing, bool with_radii);
+                        float spacing, SurfelDiscs discs);
 Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t index);
+
+// A disc of a shape is as large as that of a square with sides of this many radii.
+inline constexpr float kSidePerRadius = 1.8f;
+
+// The corners of what is drawn for a surfel's disc, relative to its centre: a square of that side,
+// or, of a shape, a hexagon around its ellipse, without what its cuts take away. Their number;
+// convex, counter-clockwise seen from where the normal points.
+inline constexpr int kMostDiscCorners = 6 + kMostSurfelCuts;
+int discPolygon(const SurfelLevel& level, const Surfel& surfel, float side,
+                std::array<Vec3, kMostDiscCorners>& corners);
 
 // Throw kParse (where: names the file) unless blocks, counts, numbers and finishes make sense.
 void checkSurfelModel(const SurfelModel& model, const std::string& where);

@@ -303,7 +303,8 @@ private:
             }
             if (surfels.empty()) return;
             levels.push_back(packSurfels(std::move(surfels), finishes,
-                                         spacing * std::exp2(0.5f * float(l)), false));
+                                         spacing * std::exp2(0.5f * float(l)),
+                                         SurfelDiscs::kAlike));
         }
     }
 
@@ -411,7 +412,7 @@ Source sourceOf(const Scene& scene, const HybridOptions& options, ThreadPool& po
     SplatReport report;
     const SurfelModel splats = buildSplats(
         scene, options.splats, pool, cancel, [](double) {}, report);
-    source.mesh = discSquares(splats, splats.levels[0], kDiscSide);
+    source.mesh = discPolygons(splats, splats.levels[0], kDiscSide);
     for (const SurfelFinish& finish : splats.finishes) {
         source.materials.push_back(finish.material);
         source.materials.back().base_color = Vec3(1.0f);

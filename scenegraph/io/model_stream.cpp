@@ -40,11 +40,10 @@ ModelBody modelBody(const std::string& text, const std::string& where) {
     if (text.size() < sizeof header || std::memcmp(text.data(), kMagic, sizeof kMagic) != 0)
         throw Error(ErrorCode::kParse, where, "is no model made by 'stipple build'");
     std::memcpy(&header, text.data(), sizeof header);
-    if ((header.version != kSurfelVersion && header.version != kHybridVersion) ||
-        header.flags != 0) {
+    if (header.version < kSurfelVersion || header.version > kShapeVersion || header.flags != 0) {
         throw Error(ErrorCode::kUnsupported, where,
                     "has version " + std::to_string(header.version) + "; this program reads " +
-                        std::to_string(kSurfelVersion) + " and " + std::to_string(kHybridVersion));
+                        std::to_string(kSurfelVersion) + " to " + std::to_string(kShapeVersion));
     }
     const size_t size = text.size() - sizeof header;
     if (header.size != size) {

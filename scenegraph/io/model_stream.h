@@ -16,7 +16,8 @@ namespace stipple {
 
 static_assert(std::endian::native == std::endian::little, "model files are little-endian");
 
-inline constexpr uint32_t kSurfelVersion = 1, kHybridVersion = 2;  // of the file's layout
+// Of the file's layout: surfels that are alike or circles, hybrids, splats with shapes.
+inline constexpr uint32_t kSurfelVersion = 1, kHybridVersion = 2, kShapeVersion = 3;
 
 // The whole file: header and body.
 std::string modelFileText(uint32_t version, const std::string& body);
@@ -136,7 +137,7 @@ void transferBlock(Stream& stream, SurfelBlock& b) {
 }
 
 template <class Stream>
-void transferLevels(Stream& stream, std::vector<SurfelLevel>& levels) {
+void transferLevels(Stream& stream, std::vector<SurfelLevel>& levels, bool with_shapes) {
     constexpr size_t kLeastLevel = 44, kBlock = 76;
     stream.list(levels, kLeastLevel, [&](SurfelLevel& level) {
         stream.value(level.spacing);
@@ -146,6 +147,10 @@ void transferLevels(Stream& stream, std::vector<SurfelLevel>& levels) {
         stream.array(level.normal);
         stream.array(level.albedo_finish);
         stream.array(level.radius);
+        if (with_shapes) {
+            stream.array(level.shapes);
+            stream.array(level.cuts);
+        }
     });
 }
 

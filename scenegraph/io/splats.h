@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surface splats from point clouds: as few discs as cover all points within a tolerance, closed
-// over the gaps between the points. Based on: Wu, Kobbelt. Optimized Sub-Sampling of Point Sets for
-// Surface Splatting. 2004; Johnson. Point-based Graphics for Estimated Surfaces.
+// Surface splats from point clouds: as few ellipses as cover all points within a tolerance, closed
+// over the gaps between the points, and cut at creases. Based on: Wu, Kobbelt. Optimized
+// Sub-Sampling of Point Sets for Surface Splatting. 2004; Johnson. Point-based Graphics for
+// Estimated Surfaces.
 #pragma once
 
 #include <core/parallel.h>
+#include <scenegraph/io/splat_grow.h>
 #include <scenegraph/scene.h>
 
 #include <functional>
@@ -17,12 +19,17 @@ struct SplatOptions {
     double color_tolerance = 0.15;  // of points' colours from their splat's, 0..2 (sRGB, a channel)
     int neighbours = 12;            // that a point's plane is fitted to
     int points = 200000;            // taken on meshes; clouds are taken as they are
+    bool are_circles = false;       // instead of ellipses along the principal curvatures
+    bool has_cuts = true;           // lines that cut splats at creases
     bool relax = true;              // leave splats out whose points others cover
     bool naive = false;             // one splat a point, for comparison
 };
 
 // Sets one option from text, as `stipple build --set` has it. Throws kInvalidArgument.
 void applyOption(SplatOptions& options, const std::string& key, const std::string& value);
+
+// diagonal: of the bounds, m.
+SplatRules rulesOf(const SplatOptions& options, double diagonal);
 
 struct SplatReport {
     double seconds = 0.0;

@@ -5,19 +5,26 @@
 #include <scenegraph/io/model.h>
 #include <scenegraph/io/model_stream.h>
 
+#include <algorithm>
+
 namespace stipple {
 
 namespace {
 
 template <class Stream>
-void transferModel(Stream& stream, SurfelModel& model) {
+void transferModel(Stream& stream, SurfelModel& model, bool with_shapes) {
     stream.string(model.kind);
     stream.string(model.source);
     stream.value(model.bounds.min);
     stream.value(model.bounds.max);
     stream.value(model.area);
     transferFinishes(stream, model.finishes);
-    transferLevels(stream, model.levels);
+    transferLevels(stream, model.levels, with_shapes);
+}
+
+bool hasShapes(const SurfelModel& model) {
+    return std::any_of(model.levels.begin(), model.levels.end(),
+                       [](const SurfelLevel& level) { return !level.shapes.empty(); });
 }
 
 }  // namespace
@@ -25,43 +32,43 @@ void transferModel(Stream& stream, SurfelModel& model) {
 std::string surfelFileText(const SurfelModel& model) {
     SurfelModel copy = model;
     ModelWriter writer;
-    transferModel(writer, copy);
-    return modelFileText(kSurfelVersion, writer.text);
+    const bool with_shapes = hasShapes(model);
+    transferModel(writer, copy, with_shapes);
+    return modelFileText(with_shapes ? kShapeVersion : kSurfelVersion, writer.text);
 }
 
 SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
                             const std::string& where) {
     const ModelBody body = modelBody(text, where);
-    if (body.version != kSurfelVersion)
+    if (body.version != kSurfelVersion && body.version != kShapeVersion)
         throw Error(ErrorCode::kParse, where, "holds no model of surfels alone");
     SurfelModel model;
     ModelReader reader(body.data, body.size, budget, where);
-    transferModel(reader, model);
+    transferModel(reader, model, body.version == kShapeVersion);
     if (!reader.isAtEnd()) throw Error(ErrorCode::kParse, where, "has bytes behind its end");
     checkSurfelModel(model, where);
     return model;
 }
 
-Mesh discSquares(const SurfelModel& model, const SurfelLevel& level, float side) {
+Mesh discPolygons(const SurfelModel& model, const SurfelLevel& level, float side) {
     Mesh mesh;
+    std::array<Vec3, kMostDiscCorners> corners;
     for (const SurfelBlock& block : level.blocks) {
         for (uint32_t i = block.first; i < block.first + block.count; ++i) {
             const Surfel s = unpackSurfel(level, block, i);
-            const Vec3 other = std::abs(s.normal.x) < 0.7f ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
-            const float half = 0.5f * level.spacing * s.radius_share * side;
-            const Vec3 a = glm::normalize(glm::cross(s.normal, other)) * half,
-                       b = glm::cross(s.normal, a);
+            const int n = discPolygon(level, s, level.spacing * s.radius_share * side, corners);
             const uint32_t first = uint32_t(mesh.positions.size());
-            for (const Vec3& corner : {-a - b, a - b, a + b, b - a}) {
+            for (int k = 0; k < n; ++k) {
                 // Within the source's bounds: both are looked at from the same default camera.
-                mesh.positions.push_back(
-                    glm::clamp(s.position + corner, model.bounds.min, model.bounds.max));
+                mesh.positions.push_back(glm::clamp(s.position + corners[size_t(k)],
+                                                    model.bounds.min, model.bounds.max));
                 mesh.normals.push_back(s.normal);
                 mesh.colors.emplace_back(s.albedo, 1.0f);
             }
-            mesh.triangles.emplace_back(first, first + 1, first + 2);
-            mesh.triangles.emplace_back(first, first + 2, first + 3);
-            mesh.triangle_material.insert(mesh.triangle_material.end(), 2, s.finish);
+            for (int k = 2; k < n; ++k) {
+                mesh.triangles.emplace_back(first, first + uint32_t(k) - 1, first + uint32_t(k));
+                mesh.triangle_material.push_back(s.finish);
+            }
         }
     }
     return mesh;
@@ -86,27 +93,30 @@ Mesh standInMesh(const SurfelModel& model) {
         area += share * share * double(level->spacing) * double(level->spacing);
     }
     const double shrink = area > 0.0 && model.area > 0.0 ? std::sqrt(model.area / area) : 1.0;
-    return discSquares(model, *level, float(shrink));
+    return discPolygons(model, *level, float(shrink));
 }
 
 }  // namespace
+
+ChildRef addSurfelModel(Scene& scene, SurfelModel model, const std::string& name) {
+    Mesh mesh = standInMesh(model);
+    mesh.name = name;
+    mesh.first_finish = uint32_t(scene.materials.size());
+    std::vector<Material> materials;
+    for (const SurfelFinish& finish : model.finishes) {
+        materials.push_back(finish.material);
+        materials.back().base_color = Vec3(1.0f);
+    }
+    mesh.surfels = std::make_shared<SurfelModel>(std::move(model));
+    return addModel(scene, std::move(mesh), std::move(materials), name);
+}
 
 ChildRef loadSurfelModel(const std::filesystem::path& path, const std::string& name, Scene& scene,
                          LoadContext& context) {
     const std::string text = readFile(path, context.budget, name);
     if (modelBody(text, name).version == kHybridVersion)
         return addHybridModel(scene, parseHybridFile(text, context.budget, name), name);
-    auto model = std::make_shared<SurfelModel>(parseSurfelFile(text, context.budget, name));
-    Mesh mesh = standInMesh(*model);
-    mesh.name = name;
-    mesh.first_finish = uint32_t(scene.materials.size());
-    std::vector<Material> materials;
-    for (const SurfelFinish& finish : model->finishes) {
-        materials.push_back(finish.material);
-        materials.back().base_color = Vec3(1.0f);
-    }
-    mesh.surfels = std::move(model);
-    return addModel(scene, std::move(mesh), std::move(materials), name);
+    return addSurfelModel(scene, parseSurfelFile(text, context.budget, name), name);
 }
 
 }  // namespace stipple

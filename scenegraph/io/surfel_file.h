@@ -15,12 +15,16 @@ std::string surfelFileText(const SurfelModel& model);
 SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
                             const std::string& where);
 
-// Squares that stand for a level's surfels, with sides of that many spacings; materials: finishes.
-Mesh discSquares(const SurfelModel& model, const SurfelLevel& level, float side);
+// Squares or, of shapes, discPolygon()s that stand for a level's surfels, with sides of that many
+// spacings; materials: finishes.
+Mesh discPolygons(const SurfelModel& model, const SurfelLevel& level, float side);
 
-// A model of any kind as an asset. One of surfels is drawn by its surfels where they are needed,
-// and far away, by rays and by the z-buffer by a mesh of squares that stand for them. Throws as
-// above.
+// A model as an asset: drawn by its surfels where they are needed, and far away, by rays and by the
+// z-buffer by a mesh of squares or polygons that stand for them. The scene has not been built.
+// name: of the mesh. Throws kUnsupported for more than 65536 materials.
+ChildRef addSurfelModel(Scene& scene, SurfelModel model, const std::string& name);
+
+// A model of any kind from its file. Throws as parseSurfelFile() and addSurfelModel().
 ChildRef loadSurfelModel(const std::filesystem::path& path, const std::string& name, Scene& scene,
                          LoadContext& context);
 

@@ -11,6 +11,7 @@
 #include <core/surface.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <memory>
@@ -80,6 +81,23 @@ inline constexpr uint8_t kBlended = 2;
 // Blended surfaces are as good as opaque where alpha is at least this, and drawn so.
 inline constexpr float kOpaqueAlpha = 254.5f / 255.0f;
 
+// A disc that is no circle, or that lines cut: centre + u axis[0] + v axis[1], inside of an ellipse
+// around the centre.
+struct DiscShape {
+    // Half axes, or what an affine map made of them, in camera space; scaled to span an area of 1.
+    std::array<Vec3, 2> axis = {Vec3(1, 0, 0), Vec3(0, 1, 0)};
+    static constexpr int kMostCuts = 4;
+    int n_cuts = 0;
+    std::array<Vec3, kMostCuts> cuts = {};  // there is surface where x u + y v <= z, u and v in m
+
+    bool hasSurface(float u, float v) const {
+        for (int i = 0; i < n_cuts; ++i) {
+            if (cuts[size_t(i)].x * u + cuts[size_t(i)].y * v > cuts[size_t(i)].z) return false;
+        }
+        return true;
+    }
+};
+
 // Up to 64 points in camera space, structure of arrays.
 struct PointBlock {
     int count = 0;
@@ -99,6 +117,8 @@ struct PointBlock {
     alignas(64) float normal_z[kBlockPoints + kBlockPadding];
     alignas(64) float area[kBlockPoints + kBlockPadding];
     bool is_prebuilt = false;  // areas are those of discs that close the surface, however dense
+    // One a point, for sinks that want surfels; nullptr: all are circles.
+    const DiscShape* shapes = nullptr;
 };
 
 // Says whether a triangle of a block has surface at a subpixel (alpha masks). For sinks that want

@@ -16,26 +16,34 @@ std::vector<Surfel> ball(int n) {
         const float z = float(rng.uniform(-1, 1)), a = float(rng.uniform(0, 2 * kPi));
         const float r = std::sqrt(1 - z * z);
         const Vec3 p(r * std::cos(a), r * std::sin(a), z);
-        surfels.push_back({p * 2.0f + Vec3(5, 0, 0), p, Vec3(0.2f, 0.5f, 0.8f), uint8_t(i % 2),
-                           1.0f + float(i % 5)});
+        Surfel s = {p * 2.0f + Vec3(5, 0, 0), p, Vec3(0.2f, 0.5f, 0.8f), uint8_t(i % 2),
+                    1.0f + float(i % 5)};
+        Vec3 u, v;
+        tangents(p, u, v);
+        s.along = u * std::cos(a * 3.0f) + v * std::sin(a * 3.0f);
+        s.ratio = 0.25f + 0.15f * float(i % 6);
+        s.n_cuts = i % (kMostSurfelCuts + 1);
+        for (int c = 0; c < s.n_cuts; ++c)
+            s.cuts[size_t(c)] = Vec3(std::cos(a + float(c)), std::sin(a + float(c)), 0.3f);
+        surfels.push_back(s);
     }
     return surfels;
 }
 
-SurfelModel ballModel(bool with_radii) {
+SurfelModel ballModel(SurfelDiscs discs) {
     SurfelModel model;
-    model.kind = with_radii ? "splats" : "point-blocks";
+    model.kind = discs == SurfelDiscs::kAlike ? "point-blocks" : "splats";
     model.source = "ball.ply";
     model.bounds = {Vec3(3, -2, -2), Vec3(7, 2, 2)};
     model.area = 16 * kPi;
     model.finishes.resize(2);
-    model.levels.push_back(packSurfels(ball(5000), model.finishes, 0.05f, with_radii));
-    model.levels.push_back(packSurfels(ball(1000), model.finishes, 0.1f, with_radii));
+    model.levels.push_back(packSurfels(ball(5000), model.finishes, 0.05f, discs));
+    model.levels.push_back(packSurfels(ball(1000), model.finishes, 0.1f, discs));
     return model;
 }
 
 TEST(SurfelModel, packedSurfelsComeBackWithinTheirSteps) {
-    const SurfelModel model = ballModel(true);
+    const SurfelModel model = ballModel(SurfelDiscs::kRadii);
     const SurfelLevel& level = model.levels[0];
     ASSERT_EQ(level.size(), 5000u);
     size_t count = 0;
@@ -58,7 +66,7 @@ TEST(SurfelModel, packedSurfelsComeBackWithinTheirSteps) {
 
 // Nothing of a block may be seen from where its cone says so.
 TEST(SurfelModel, conesHideWhatFacesAway) {
-    const SurfelModel model = ballModel(false);
+    const SurfelModel model = ballModel(SurfelDiscs::kAlike);
     Rng rng{3};
     int hidden = 0, tried = 0;
     for (const SurfelBlock& block : model.levels[0].blocks) {
@@ -94,14 +102,77 @@ TEST(SurfelModel, maskDirectionsCoverTheSphereEvenly) {
     for (int m = 0; m < kMaskDirections; ++m) EXPECT_EQ(maskDirectionIndex(maskDirectionOf(m)), m);
 }
 
+TEST(SurfelModel, shapesComeBackWithinTheirSteps) {
+    SurfelModel model = ballModel(SurfelDiscs::kShapes);
+    const SurfelLevel& level = model.levels[0];
+    ASSERT_EQ(level.shapes.size(), 5000u);
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            const Vec3 p = glm::normalize(s.position - Vec3(5, 0, 0));
+            EXPECT_GT(glm::dot(s.normal, p), 0.99999f);
+            EXPECT_NEAR(glm::dot(s.normal, s.along), 0.0f, 1e-5f);
+            // The angle about z, as above, says the way of the long half axis and of the cuts.
+            const float a = std::atan2(p.y, p.x);
+            Vec3 u, v;
+            tangents(s.normal, u, v);
+            const Vec3 along = u * std::cos(a * 3.0f) + v * std::sin(a * 3.0f);
+            if (std::hypot(p.x, p.y) > 0.1f && std::abs(p.z) > 0.01f) {
+                EXPECT_GT(glm::dot(along, s.along), 0.99f);
+            }
+            for (int c = 0; c < s.n_cuts; ++c) EXPECT_NEAR(s.cuts[size_t(c)].z, 0.3f, 1e-4f);
+        }
+    }
+}
+
+TEST(SurfelModel, polygonsEnclosePartsOfEllipses) {
+    const SurfelModel model = ballModel(SurfelDiscs::kShapes);
+    const SurfelLevel& level = model.levels[0];
+    std::array<Vec3, kMostDiscCorners> corners;
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            const int n = discPolygon(level, s, kSidePerRadius, corners);
+            ASSERT_GE(n, 3);
+            const float long_axis = 1.0f / std::sqrt(s.ratio);
+            const Vec3 across = glm::cross(s.normal, s.along);
+            for (int k = 0; k < 40; ++k) {
+                const float t = float(k) * 0.157f;
+                const Vec2 p(std::cos(t) * long_axis, std::sin(t) * long_axis * s.ratio);
+                bool is_kept = true;
+                for (int c = 0; c < s.n_cuts; ++c) {
+                    const Vec3& cut = s.cuts[size_t(c)];
+                    const float beyond = cut.x * p.x + cut.y * p.y - cut.z * long_axis;
+                    is_kept = is_kept && beyond <= 0.0f;
+                }
+                float farthest = -kInfinity;  // outside of an edge
+                for (int c = 0; c < n; ++c) {
+                    const Vec3 &from = corners[size_t(c)], &to = corners[size_t((c + 1) % n)];
+                    const Vec3 outwards = glm::cross(to - from, s.normal);
+                    if (glm::length(outwards) < 1e-4f) continue;
+                    const Vec3 d = s.along * p.x + across * p.y - from;
+                    farthest = std::max(farthest, glm::dot(glm::normalize(outwards), d));
+                }
+                if (is_kept) {
+                    EXPECT_LE(farthest, 1e-3f);
+                }
+            }
+        }
+    }
+}
+
 TEST(SurfelFile, comesBackAsItWas) {
-    const SurfelModel model = ballModel(true);
+    const SurfelModel model = ballModel(SurfelDiscs::kRadii);
     const std::string text = surfelFileText(model);
     MemoryBudget budget(0);
     const SurfelModel read = parseSurfelFile(text, budget, "ball.stipple");
     EXPECT_EQ(surfelFileText(read), text);
     EXPECT_EQ(read.source, "ball.ply");
     EXPECT_EQ(read.levels[1].position, model.levels[1].position);
+    const std::string shaped = surfelFileText(ballModel(SurfelDiscs::kShapes));
+    EXPECT_EQ(surfelFileText(parseSurfelFile(shaped, budget, "ball.stipple")), shaped);
+    EXPECT_EQ(text[8], 1);
+    EXPECT_EQ(shaped[8], 3);
 }
 
 std::string errorOf(const std::string& text) {
@@ -130,8 +201,13 @@ std::string withChecksum(std::string text) {
     return text;
 }
 
-TEST(SurfelFile, refusesWhatIsDamaged) {
-    SurfelModel small = ballModel(false);
+class DamagedFile : public testing::TestWithParam<SurfelDiscs> {};
+
+INSTANTIATE_TEST_SUITE_P(SurfelFile, DamagedFile,
+                         testing::Values(SurfelDiscs::kAlike, SurfelDiscs::kShapes));
+
+TEST_P(DamagedFile, isRefused) {
+    SurfelModel small = ballModel(GetParam());
     small.levels.erase(small.levels.begin());
     const std::string text = surfelFileText(small);
     EXPECT_EQ(withChecksum(text), text);  // as the writer does it

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// Splats beside rays through the surface that their points lie on: closed from everywhere, near and
+// far, with every reconstruction; fewer as ellipses than as circles; cut along the edges of a box.
+#include <gtest/gtest.h>
+#include <render/compare.h>
+#include <scenegraph/io/load.h>
+#include <scenegraph/io/splats.h>
+#include <scenegraph/io/surfel_file.h>
+#include <tests/image/test_scene.h>
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+namespace stipple {
+namespace {
+
+Scene sourceOf(GeneratedMesh made) {
+    TestScene scene;
+    scene.add(std::move(made), Affine());
+    scene.build();
+    scene.scene.lighting.suns.push_back({glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(2.0f)});
+    return scene.scene;
+}
+
+// The model of the source as a file's text, and loaded again, in the same light.
+Scene modelOf(const Scene& source, const SplatOptions& options, ThreadPool& pool,
+              SplatReport& report) {
+    const CancelFlag cancel;
+    const std::filesystem::path path = std::filesystem::temp_directory_path() /
+                                       ("stipple-splats-" + std::to_string(getpid()) + ".stipple");
+    std::ofstream(path, std::ios::binary) << surfelFileText(buildSplats(
+        source, options, pool, cancel, [](double) {}, report));
+    Diagnostics diagnostics;
+    Scene scene = loadScene(path.string(), {true, 0, nullptr}, pool, diagnostics);
+    std::filesystem::remove(path);
+    scene.lighting = source.lighting;
+    return scene;
+}
+
+// From a direction, the bounds' diagonal `size` pixels long.
+Camera cameraTo(const Scene& scene, const Vec3& from, double size, int pixels) {
+    const DBox3 bounds = sceneBounds(scene);
+    const DVec3 center = 0.5 * (bounds.min + bounds.max);
+    const double diagonal = glm::length(bounds.max - bounds.min);
+    Camera camera = lookAt(center + DVec3(from) * diagonal * 3.0, center);
+    camera.fov_y = 2.0 * std::atan(0.5 * pixels / size / 3.0);
+    return camera;
+}
+
+Image draw(const Scene& scene, const Camera& camera, int pixels, Method method, int rays,
+           ThreadPool& pool, Reconstruct reconstruct = Reconstruct::kPerPixel) {
+    FrameRequest r;
+    r.camera = camera;
+    r.settings.width = r.settings.height = pixels;
+    r.settings.subpixels = 2;
+    r.settings.method = method;
+    r.settings.reconstruct = reconstruct;
+    r.settings.samples = rays;
+    r.aovs = {"depth", "coverage"};
+    return Renderer(scene, pool).render(r).image;
+}
+
+struct Seen {
+    size_t holes = 0;
+    double worst = 1e9, mean = 0.0;  // dB
+    int worst_view = 0;
+};
+
+// From `views` directions, none with a height below `lowest`, the diagonal 60 to 200 pixels long.
+Seen lookAround(const Scene& source, const Scene& model, int views, ThreadPool& pool,
+                Reconstruct reconstruct = Reconstruct::kPerPixel, float lowest = -1.0f) {
+    Seen seen;
+    for (int i = 0, n = 0; n < views; ++i) {
+        if (maskDirectionOf(i * 37 % kMaskDirections).y < lowest) continue;
+        const Camera camera =
+            cameraTo(source, maskDirectionOf(i * 37 % kMaskDirections), 60.0 + 1.4 * n, 128);
+        const auto result =
+            compareImages(draw(model, camera, 128, Method::kPoints, 1, pool, reconstruct),
+                          draw(source, camera, 128, Method::kRaycast, 16, pool), pool);
+        seen.holes += result.holes->count;
+        if (result.psnr < seen.worst) seen.worst = result.psnr, seen.worst_view = i;
+        seen.mean += result.psnr / views;
+        ++n;
+    }
+    return seen;
+}
+
+SplatOptions optionsOf(double tolerance, bool circles, int points = 40000) {
+    SplatOptions options;
+    options.tolerance = tolerance;
+    options.are_circles = circles;
+    options.points = points;
+    return options;
+}
+
+GeneratedMesh box() { return makePrimitive("box", 12, Vec3(0.8f, 0.5f, 0.3f)); }
+GeneratedMesh ring() { return makePrimitive("torus", 4000, Vec3(0.8f, 0.5f, 0.3f)); }
+
+TEST(Splats, ellipsesAreFewerThanCirclesAndAsClosed) {
+    ThreadPool pool(2);
+    const Scene source = sourceOf(ring());
+    SplatReport circles, ellipses;
+    const Scene of_circles = modelOf(source, optionsOf(0.1, true), pool, circles),
+                of_ellipses = modelOf(source, optionsOf(0.1, false), pool, ellipses);
+    EXPECT_LT(double(ellipses.splats), 0.75 * double(circles.splats));
+    EXPECT_LE(ellipses.largest_distance, ellipses.tolerance * 1.001);
+    for (const Scene* model : {&of_circles, &of_ellipses}) {
+        const Seen seen = lookAround(source, *model, 20, pool);
+        EXPECT_EQ(seen.holes, 0u);
+        EXPECT_GE(seen.worst, 28.0);
+    }
+}
+
+TEST(Splats, edgesOfABoxStaySharp) {
+    ThreadPool pool(2);
+    const Scene source = sourceOf(box());
+    SplatOptions cut = optionsOf(0.1, false), whole = cut;
+    whole.has_cuts = false;
+    SplatReport cut_report, whole_report;
+    const Scene cut_model = modelOf(source, cut, pool, cut_report),
+                whole_model = modelOf(source, whole, pool, whole_report);
+    EXPECT_LT(cut_report.splats, whole_report.splats);
+    for (const Reconstruct reconstruct : {Reconstruct::kPerPixel, Reconstruct::kEwa}) {
+        const Seen of_cut = lookAround(source, cut_model, 20, pool, reconstruct),
+                   of_whole = lookAround(source, whole_model, 20, pool, reconstruct);
+        EXPECT_EQ(of_cut.holes, 0u) << int(reconstruct);
+        EXPECT_GE(of_cut.worst, 30.0) << int(reconstruct);
+        EXPECT_GT(of_cut.mean, of_whole.mean + 2.0) << int(reconstruct);
+    }
+}
+
+// What is drawn for a splat ends at the edges, but for the tolerance and the steps of positions.
+TEST(Splats, nothingReachesBeyondABox) {
+    ThreadPool pool(2);
+    const Scene source = sourceOf(box());
+    const CancelFlag cancel;
+    SplatReport report;
+    const SurfelModel model = buildSplats(
+        source, optionsOf(0.1, false), pool, cancel, [](double) {}, report);
+    const SurfelLevel& level = model.levels[0];
+    const float slack = float(3.0 * report.tolerance);
+    std::array<Vec3, kMostDiscCorners> corners;
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            const int n =
+                discPolygon(level, s, kDiscSide * level.spacing * s.radius_share, corners);
+            ASSERT_GE(n, 3);
+            for (int c = 0; c < n; ++c) {
+                const Vec3 p = glm::abs(s.position + corners[size_t(c)]);
+                EXPECT_LE(std::max({p.x, p.y, p.z}), 0.5f + slack)
+                    << i << ": " << s.n_cuts << " cuts, center " << s.position.x << " "
+                    << s.position.y << " " << s.position.z << ", normal " << s.normal.x << " "
+                    << s.normal.y << " " << s.normal.z << ", corner " << p.x << " " << p.y << " "
+                    << p.z << ", ratio " << s.ratio << " long "
+                    << level.spacing * s.radius_share / std::sqrt(s.ratio) / 1.44f;
+            }
+        }
+    }
+}
+
+TEST(Splats, everyReconstructionShowsEllipses) {
+    ThreadPool pool(2);
+    const Scene source = sourceOf(ring());
+    SplatReport report;
+    const Scene model = modelOf(source, optionsOf(0.1, false), pool, report);
+    for (const Reconstruct reconstruct : kReconstructions) {
+        const Seen seen = lookAround(source, model, 6, pool, reconstruct);
+        EXPECT_GE(seen.worst, 26.0) << int(reconstruct);
+        EXPECT_EQ(seen.holes, 0u) << int(reconstruct);
+    }
+}
+
+// A scan from 100 directions: no hole, alike, and fewer ellipses than circles.
+TEST(Splats, aScanIsClosedFromEverywhere) {
+    const char* folder = std::getenv("STIPPLE_TEST_DATA");
+    if (!folder || !*folder) GTEST_SKIP() << "no test data (STIPPLE_TEST_DATA)";
+    const std::filesystem::path mesh = std::filesystem::path(folder) / "meshes/bunny/bunny.glb",
+                                cloud = std::filesystem::path(folder) /
+                                        "pointclouds/bunny_points_normals.ply";
+    if (!std::filesystem::exists(mesh) || !std::filesystem::exists(cloud))
+        GTEST_SKIP() << "no test data " << mesh << " or " << cloud;
+    ThreadPool pool(2);
+    Diagnostics diagnostics;
+    Scene source = loadScene(mesh.string(), {true, 0, nullptr}, pool, diagnostics);
+    const Scene points = loadScene(cloud.string(), {true, 0, nullptr}, pool, diagnostics);
+    SplatReport circles, ellipses;
+    modelOf(points, optionsOf(0.1, true), pool, circles);
+    Scene model = modelOf(points, optionsOf(0.1, false), pool, ellipses);
+    model.lighting = source.lighting;
+    EXPECT_LT(ellipses.splats, circles.splats);
+    for (const Reconstruct reconstruct : {Reconstruct::kPerPixel, Reconstruct::kEwa}) {
+        // Not from below, where the scan has holes of its own that flat splats close.
+        const Seen seen = lookAround(source, model, 100, pool, reconstruct, -0.2f);
+        EXPECT_EQ(seen.holes, 0u) << int(reconstruct);
+        EXPECT_GE(seen.mean, 28.0)
+            << int(reconstruct) << ", worst " << seen.worst << " in view " << seen.worst_view;
+    }
+}
+
+}  // namespace
+}  // namespace stipple
