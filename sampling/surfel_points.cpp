@@ -69,9 +69,10 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     const Vec3 middle(frame.camera_from_object.point(DVec3(model.bounds.center())));
     // What reaches to the eye's side has blocks that are stretched more, and see to it themselves.
     const float nearest = std::max(z_min, view.near_z);
-    const float per_metre = view.orthographic ? scaled_focal
-                                              : scaled_focal / nearest *
-                                                    stretch(view, middle, std::max(middle.z, nearest));
+    const float per_metre =
+        view.orthographic
+            ? scaled_focal
+            : scaled_focal / nearest * stretch(view, middle, std::max(middle.z, nearest));
     const float wanted = 1.0f / float(std::sqrt(context_.settings.samples));
     const int n_levels = int(model.levels.size());
     if (!mesh.triangles.empty() && model.levels.back().spacing * per_metre < kFarShare * wanted)
@@ -79,8 +80,8 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     int l = n_levels - 1;
     while (l > 0 && model.levels[size_t(l)].spacing * per_metre > wanted) --l;
     const SurfelLevel& level = model.levels[size_t(l)];
-    Placed placed{frame, model, level, mesh_index, l, scale, {},
-                  makeModelEye(frame, model, view.orthographic)};
+    Placed placed{frame, model, level, mesh_index,
+                  l,     scale, {},    makeModelEye(frame, model, view.orthographic)};
     for (size_t i = 0; i < model.finishes.size(); ++i) {
         placed.width_codes[i] =
             int(patchWidthCode(model.finishes[i].patch_width * scale, kFirstMetreExponent));
@@ -174,7 +175,8 @@ void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
     PointBlock& out = block_;
     out.count = n;
     out.is_prebuilt = true;
-    warpPoints(warp, placed.level.position.data() + b.first, n, addRun(placed, b.first, false), out);
+    warpPoints(warp, placed.level.position.data() + b.first, n, addRun(placed, b.first, false),
+               out);
     const bool with_shapes = context_.sink->wantsSurfels();
     if (with_shapes || !placed.model.leaves_no_holes) {
         addWidths(placed, b);
@@ -261,8 +263,8 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
             tangents(normal, a_object, c_object);
             const Vec3 a = linear * (a_object * half), c = linear * (c_object * half);
             Vec3 corners[4] = {center - a - c, center + a - c, center + a + c, center + c - a};
-            const float nearest =
-                std::min(std::min(corners[0].z, corners[1].z), std::min(corners[2].z, corners[3].z));
+            const float nearest = std::min(std::min(corners[0].z, corners[1].z),
+                                           std::min(corners[2].z, corners[3].z));
             // Before the eye and with the front to it, or without any extent.
             if (!(nearest > view.near_z) || showsBack(eye, finish.material, normal, position))
                 std::fill(corners, corners + 4, Vec3(0, 0, view.near_z * 2.0f));
@@ -296,9 +298,8 @@ void surfelAttributes(const Scene& scene, const Mat3& world_from_camera, const R
     sample.finish = plainFinish(scene.materials[sample.material]);
     sample.patch_width = mesh.surfels->finishes[finish].patch_width * run.length_scale;
     sample.object = objectId(run.path);
-    sample.normal_world =
-        glm::normalize(world_from_camera *
-                       (run.camera_from_normal * unpackNormal16(level.normal[index])));
+    sample.normal_world = glm::normalize(
+        world_from_camera * (run.camera_from_normal * unpackNormal16(level.normal[index])));
 }
 
 }  // namespace stipple

@@ -10,7 +10,7 @@ namespace stipple {
 
 // The eye in a model's object space.
 struct ModelEye {
-    Vec3 eye = Vec3(0);  // perspective
+    Vec3 eye = Vec3(0);           // perspective
     Vec3 to_eye = Vec3(0, 0, 1);  // orthographic: towards the viewer, any length
     bool orthographic = false;
     bool is_outside = true;  // well outside the model's bounds: masks were found from there
@@ -25,8 +25,7 @@ inline ModelEye makeModelEye(const InstanceFrame& frame, const SurfelModel& mode
     eye.eye = Vec3(frame.eye_object);
     eye.to_eye = Vec3(-frame.facing);
     eye.orthographic = orthographic;
-    eye.is_outside = orthographic ||
-                     glm::any(glm::lessThan(frame.eye_object, low - margin)) ||
+    eye.is_outside = orthographic || glm::any(glm::lessThan(frame.eye_object, low - margin)) ||
                      glm::any(glm::greaterThan(frame.eye_object, high + margin));
     return eye;
 }
