@@ -33,6 +33,7 @@ std::vector<std::string> channelNames(const std::vector<std::string>& aovs) {
 Picture::Picture(const View& view, const Lighting& lighting, const std::vector<std::string>& aovs,
                  bool transparent)
     : view_(view),
+      world_from_camera_(glm::transpose(view.camera_from_world)),
       lighting_(lighting),
       transparent_(transparent),
       exposure_(std::exp2(lighting.exposure)),
@@ -67,8 +68,7 @@ void Picture::write(int x, int y, const PixelSums& s) {
         Vec3 origin, direction;
         view_.ray((float(x) + 0.5f) * float(view_.subpixels),
                   (float(y) + 0.5f) * float(view_.subpixels), origin, direction);
-        const Vec3 world =
-            glm::normalize(Mat3(glm::transpose(view_.camera_from_world)) * direction);
+        const Vec3 world = glm::normalize(world_from_camera_ * direction);
         color += skyRadiance(lighting_.sky, world) * (1.0f - coverage);
     }
     float* out = image_.pixel(x, y);

@@ -59,6 +59,7 @@ public:
 
 private:
     View view_;
+    Mat3 world_from_camera_;
     Lighting lighting_;
     bool transparent_;
     float exposure_;

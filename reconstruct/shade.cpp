@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 namespace stipple {
 
@@ -166,10 +167,10 @@ SurfaceSample underProjectors(SurfaceSample sample, const Material& material,
 
 Vec3 shade(const SurfaceSample& found, const Material& material, const Lighting& lighting,
            const View& view, const LightVisibility* lights, const AmbientVisibility* ambient) {
-    SurfaceSample projected;
+    std::optional<SurfaceSample> projected;
     if (!lighting.projectors.empty())
         projected = underProjectors(found, material, lighting, view, lights);
-    const SurfaceSample& sample = lighting.projectors.empty() ? found : projected;
+    const SurfaceSample& sample = projected ? *projected : found;
     if (material.unlit) return sample.albedo;
     const Vec3 to_eye_camera =
         view.orthographic ? Vec3(0.0f, 0.0f, -1.0f) : -sample.position_camera;

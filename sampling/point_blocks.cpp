@@ -164,6 +164,11 @@ public:
     // Which mask directions see each block.
     void findMasks(float pixel, SurfelLevel& level) {
         constexpr int kViews = 7;  // within a direction's part of the sphere and a little beyond
+        std::vector<Vec3> positions(level.size());
+        for (const SurfelBlock& b : level.blocks) {
+            for (uint32_t i = b.first; i < b.first + b.count; ++i)
+                positions[i] = unpackSurfel(level, b, i).position;
+        }
         std::vector<std::vector<uint8_t>> seen_from(kMaskDirections);
         pool_.forEach(kMaskDirections, [&](size_t m, int) {
             throwIfAsked();
@@ -175,13 +180,7 @@ public:
                 const Vec3 off = v == 0 ? Vec3(0.0f) : across[0] * 0.2f;
                 Picture picture(viewFromObject(glm::normalize(middle + off), 0.0f), pixel, radius_,
                                 Vec2(0.0f));
-                std::vector<Vec3> positions(level.size());
-                for (const SurfelBlock& b : level.blocks) {
-                    for (uint32_t i = b.first; i < b.first + b.count; ++i) {
-                        positions[i] = unpackSurfel(level, b, i).position;
-                        picture.draw(positions[i]);
-                    }
-                }
+                for (const Vec3& p : positions) picture.draw(p);
                 for (size_t k = 0; k < level.blocks.size(); ++k) {
                     const SurfelBlock& b = level.blocks[k];
                     size_t ignored;

@@ -2,6 +2,7 @@
 #include <sampling/surfel_points.h>
 
 #include <sampling/point_list.h>
+#include <sampling/surfel_visibility.h>
 #include <scenegraph/object_id.h>
 #include <scenegraph/surface_at.h>
 
@@ -86,17 +87,32 @@ struct SurfelPoints::Placed {
     int level_index = 0;
     float length_scale = 1.0f;
     std::array<int, 256> width_codes = {};  // of finishes, in metres of camera space
-    int first_material = 0;
-    bool blends_coarse = false;  // surfels coarser than the view asks for, by ewa
+    bool blends_coarse = false;             // surfels coarser than the view asks for, by ewa
+    ModelEye eye;
 };
+
+namespace {
+
+// By how much more than at the picture's middle a place is stretched, depths being equal.
+float stretch(const View& view, const Vec3& p, float depth) {
+    return view.orthographic ? 1.0f : std::max(glm::length(p) / depth, 1.0f);
+}
+
+}  // namespace
 
 bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z_min) {
     const Mesh& mesh = context_.scene.meshes[mesh_index];
     const SurfelModel& model = *mesh.surfels;
     const View& view = context_.view;
     const float scale = float(std::sqrt(frame.area_scale));
+    const float scaled_focal = scale * float(view.focal);
+    const Vec3 middle(frame.camera_from_object.point(DVec3(model.bounds.center())));
+    // What reaches to the eye's side has blocks that are stretched more, and see to it themselves.
+    const float nearest = std::max(z_min, view.near_z);
     const float per_metre =
-        scale * float(view.focal) / (view.orthographic ? 1.0f : std::max(z_min, view.near_z));
+        view.orthographic
+            ? scaled_focal
+            : scaled_focal / nearest * stretch(view, middle, std::max(middle.z, nearest));
     const float wanted = 1.0f / float(std::sqrt(context_.settings.samples));
     const int n_levels = int(model.levels.size());
     if (!mesh.triangles.empty() && model.levels.back().spacing * per_metre < kFarShare * wanted)
@@ -105,6 +121,7 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     while (l > 0 && model.levels[size_t(l)].spacing * per_metre > wanted) --l;
     const SurfelLevel& level = model.levels[size_t(l)];
     const bool may_be_discs = !context_.sink->wantsSurfels();
+    const float most = std::max(1.0f, wanted);  // subpixels between points without holes
     Placed placed{frame,
                   model,
                   level,
@@ -112,8 +129,8 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
                   l,
                   scale,
                   {},
-                  int(mesh.first_finish),
-                  !may_be_discs && level.spacing * per_metre > wanted};
+                  !may_be_discs && level.spacing * per_metre > wanted,
+                  makeModelEye(frame, model, view.orthographic)};
     for (size_t i = 0; i < model.finishes.size(); ++i) {
         placed.width_codes[i] =
             int(patchWidthCode(model.finishes[i].patch_width * scale, kFirstMetreExponent));
@@ -121,44 +138,26 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     const float reach = float(maxLengthScale(frame.camera_from_object.linear));
     const SubpixelRect& region = context_.sink->region();
     for (const SurfelBlock& block : level.blocks) {
+        if (coneHides(placed.eye, block) || maskHides(placed.eye, block)) continue;
         const Vec3 center(frame.camera_from_object.point(DVec3(block.bounds.center())));
         const BlockSides sides = sidesOf(level, block);
-        const bool with_discs = may_be_discs && sides.largest * per_metre > std::max(1.0f, wanted);
-        // Discs seen edge on cover no subpixel: their middles do.
-        const bool with_points = !with_discs || sides.smallest * per_metre < kFewSubpixels;
         float radius = 0.5f * glm::length(block.bounds.extent()) * reach;
+        // Each block by its own depth: only what is too near needs discs.
+        const float z = std::max(center.z - radius, view.near_z);
+        const float per_metre_here =
+            scaled_focal * (view.orthographic ? 1.0f : stretch(view, center, z) / z);
+        const bool with_discs = may_be_discs && sides.largest * per_metre_here > most;
+        // Discs seen edge on cover no subpixel: their middles do.
+        const bool with_points = !with_discs || sides.smallest * per_metre_here < kFewSubpixels;
         if (with_discs || !may_be_discs) radius += model.discSide() * sides.longest * reach;
         if (center.z + radius <= view.near_z || center.z - radius > view.far_z) continue;
         const SubpixelRect rect = ballRect(view, center, radius, region);
-        if (!rect.overlaps(region) || isHiddenFromEye(frame, model, block)) continue;
+        if (!rect.overlaps(region)) continue;
         if (context_.sink->hides(rect, std::max(center.z - radius, view.near_z), false)) continue;
         if (with_discs) drawDiscs(placed, block);
         if (with_points) drawPoints(placed, block);
     }
     return true;
-}
-
-// The sides of a block from which nothing of it is seen.
-bool SurfelPoints::isHiddenFromEye(const InstanceFrame& frame, const SurfelModel& model,
-                                   const SurfelBlock& block) const {
-    const bool orthographic = context_.view.orthographic;
-    const DVec3 center(block.bounds.center());
-    const Vec3 to_eye = orthographic ? Vec3(-frame.facing) : Vec3(frame.eye_object - center);
-    if (block.cone_sine < 1.0f) {
-        const Vec3 from_apex =
-            orthographic ? to_eye : Vec3(frame.eye_object - DVec3(block.cone_apex));
-        if (glm::dot(from_apex, block.cone_axis) < -block.cone_sine * glm::length(from_apex))
-            return true;
-    }
-    // Masks were found from outside.
-    const DVec3 margin = 0.1 * DVec3(model.bounds.extent());
-    const bool is_outside =
-        orthographic ||
-        glm::any(glm::lessThan(frame.eye_object, DVec3(model.bounds.min) - margin)) ||
-        glm::any(glm::greaterThan(frame.eye_object, DVec3(model.bounds.max) + margin));
-    if (!is_outside) return false;
-    const int d = maskDirectionIndex(to_eye);
-    return !(block.visible_from[size_t(d / 64)] >> (d % 64) & 1);
 }
 
 uint32_t SurfelPoints::addRun(const Placed& placed, uint32_t first, int numbers_shift) {
@@ -175,32 +174,56 @@ uint32_t SurfelPoints::addRun(const Placed& placed, uint32_t first, int numbers_
     return number;
 }
 
+namespace {
+
+// Of a block's points: camera space is base + x u + y v + z w, in quantization steps.
+struct Warp {
+    Vec3 base, x, y, z;
+    float z_near, z_far;
+};
+
+__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void warpPoints(
+    const Warp& w, const uint32_t* __restrict packed, int count, uint32_t first_number,
+    PointBlock& out) {
+    // Plain locals and restricted pointers, or the compiler will not vectorize.
+    const float xx = w.x.x, xy = w.x.y, xz = w.x.z, yx = w.y.x, yy = w.y.y, yz = w.y.z;
+    const float zx = w.z.x, zy = w.z.y, zz = w.z.z, bx = w.base.x, by = w.base.y, bz = w.base.z;
+    const float z_near = w.z_near, z_far = w.z_far;
+    float* __restrict out_x = out.x;
+    float* __restrict out_y = out.y;
+    float* __restrict out_z = out.z;
+    uint32_t* __restrict number = out.number;
+    uint8_t* __restrict keep = out.keep;
+    for (int i = 0; i < count; ++i) {
+        const float p = float(int(positionPart(packed[i], 0))),
+                    q = float(int(positionPart(packed[i], 1))),
+                    r = float(int(positionPart(packed[i], 2)));
+        const float z = bz + xz * p + yz * q + zz * r;
+        out_x[i] = bx + xx * p + yx * q + zx * r;
+        out_y[i] = by + xy * p + yy * q + zy * r;
+        out_z[i] = z;
+        keep[i] = uint8_t((z > z_near) & (z <= z_far));
+        number[i] = first_number + uint32_t(i);
+    }
+}
+
+}  // namespace
+
 void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
-    const SurfelLevel& level = placed.level;
     const View& view = context_.view;
     const Affine& to_camera = placed.frame.camera_from_object;
-    const Vec3 base(to_camera.point(DVec3(b.bounds.min)));
     const DVec3 step(SurfelLevel::step(b));
-    const Vec3 dx(to_camera.linear[0] * step.x), dy(to_camera.linear[1] * step.y),
-        dz(to_camera.linear[2] * step.z);
+    const Warp warp = {Vec3(to_camera.point(DVec3(b.bounds.min))),
+                       Vec3(to_camera.linear[0] * step.x),
+                       Vec3(to_camera.linear[1] * step.y),
+                       Vec3(to_camera.linear[2] * step.z),
+                       view.near_z,
+                       view.far_z};
     const int n = int(b.count);
-    const uint32_t* __restrict packed = level.position.data() + b.first;
-    const float z_near = view.near_z, z_far = view.far_z;
     PointBlock& out = block_;
     out.count = n;
     out.is_prebuilt = true;
-    for (int i = 0; i < n; ++i) {
-        const float u = float(int(positionPart(packed[i], 0))),
-                    v = float(int(positionPart(packed[i], 1))),
-                    w = float(int(positionPart(packed[i], 2)));
-        out.x[i] = base.x + dx.x * u + dy.x * v + dz.x * w;
-        out.y[i] = base.y + dx.y * u + dy.y * v + dz.y * w;
-        const float z = base.z + dx.z * u + dy.z * v + dz.z * w;
-        out.z[i] = z;
-        out.keep[i] = uint8_t((z > z_near) & (z <= z_far));
-    }
-    const uint32_t number = addRun(placed, b.first, 0);
-    for (int i = 0; i < n; ++i) out.number[i] = number + uint32_t(i);
+    warpPoints(warp, placed.level.position.data() + b.first, n, addRun(placed, b.first, 0), out);
     const bool with_shapes = context_.sink->wantsSurfels();
     if (with_shapes || !placed.model.leaves_no_holes) {
         addWidths(placed, b);
@@ -255,6 +278,19 @@ void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
     }
 }
 
+namespace {
+
+// Shading normals of what is seen at a grazing angle may well point away: that is no back.
+constexpr float kGrazing = 0.3f;
+
+bool showsBack(const ModelEye& eye, const Material& material, const Vec3& normal, const Vec3& p) {
+    if (material.double_sided) return false;
+    const Vec3 to_eye = eye.from(p);
+    return glm::dot(normal, to_eye) < -kGrazing * glm::length(to_eye);
+}
+
+}  // namespace
+
 // Polygons that stand for discs.
 void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
     const SurfelLevel& level = placed.level;
@@ -280,7 +316,9 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
             const Vec3 center(to_camera.point(DVec3(s.position)));
             const int n = discPolygon(
                 level, s, placed.model.discSide() * level.spacing * s.radius_share, corners);
-            bool is_in_front = true;
+            // Before the eye and with the front to it.
+            const SurfelFinish& finish = placed.model.finishes[s.finish];
+            bool is_in_front = !showsBack(placed.eye, finish.material, s.normal, s.position);
             for (int c = 0; c < n; ++c) {
                 corners[size_t(c)] = center + linear * corners[size_t(c)];
                 is_in_front = is_in_front && corners[size_t(c)].z > view.near_z;
@@ -299,8 +337,7 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
                     out.z[m][i] = vertices[m].z;
                 }
             }
-            const float width = placed.model.finishes[s.finish].patch_width * placed.length_scale *
-                                float(view.focal);
+            const float width = finish.patch_width * placed.length_scale * float(view.focal);
             out.is_wide =
                 out.is_wide || width >= kSurfaceWidth * (view.orthographic ? 1.0f : center.z);
         }
@@ -310,8 +347,8 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
     }
 }
 
-void surfelAttributes(const Scene& scene, const View& view, const Run& run, uint32_t index,
-                      SurfaceSample& sample) {
+void surfelAttributes(const Scene& scene, const Mat3& world_from_camera, const Run& run,
+                      uint32_t index, SurfaceSample& sample) {
     const Mesh& mesh = scene.meshes[run.child.index()];
     const SurfelLevel& level = mesh.surfels->levels[size_t(run.surfel_level)];
     const uint32_t bits = level.albedo_finish[index];
@@ -322,9 +359,8 @@ void surfelAttributes(const Scene& scene, const View& view, const Run& run, uint
     sample.finish = plainFinish(scene.materials[sample.material]);
     sample.patch_width = mesh.surfels->finishes[finish].patch_width * run.length_scale;
     sample.object = objectId(run.path);
-    sample.normal_world =
-        glm::normalize(Mat3(glm::transpose(view.camera_from_world)) *
-                       (run.camera_from_normal * unpackNormal16(level.normal[index])));
+    sample.normal_world = glm::normalize(
+        world_from_camera * (run.camera_from_normal * unpackNormal16(level.normal[index])));
 }
 
 }  // namespace stipple

@@ -21,8 +21,6 @@ public:
 private:
     struct Placed;
 
-    bool isHiddenFromEye(const InstanceFrame& frame, const SurfelModel& model,
-                         const SurfelBlock& block) const;
     void drawPoints(const Placed& placed, const SurfelBlock& block);
     void addWidths(const Placed& placed, const SurfelBlock& block);
     void addShapes(const Placed& placed, const SurfelBlock& block);
@@ -36,7 +34,7 @@ private:
 };
 
 // Attributes of a surfel of a run (Run::surfel_level).
-void surfelAttributes(const Scene& scene, const View& view, const Run& run, uint32_t index,
-                      SurfaceSample& sample);
+void surfelAttributes(const Scene& scene, const Mat3& world_from_camera, const Run& run,
+                      uint32_t index, SurfaceSample& sample);
 
 }  // namespace stipple

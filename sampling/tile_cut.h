@@ -53,6 +53,7 @@ private:
     GroupPoints group_points_;
     TriangleWriter triangles_;
     SurfelPoints surfels_;
+    const Mat3 world_from_camera_;
     std::vector<Opened> opened_;  // a stack: each opening uses its end
 };
 

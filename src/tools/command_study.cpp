@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `stipple study`: sweeps, as a table, as JSON and as a report.
 #include <core/image.h>
+#include <tools/block_study.h>
 #include <tools/command_line.h>
 #include <tools/commands.h>
 #include <tools/output_file.h>
@@ -18,15 +19,18 @@ namespace stipple {
 namespace {
 
 const HelpText kHelp = {
-    "stipple study STUDY.study.json|SCENE -o DIR [--json FILE]",
+    "stipple study STUDY.study.json|SCENE|--point-blocks ASSET... -o DIR [--json FILE]",
     "Measures pictures over settings, scene sizes and cameras, and shows what came out: "
     "DIR/report.html (plots, pictures, tables; one file that needs no network), DIR/rows.csv (a "
     "row a measurement, with all that is needed to repeat it) and DIR/pictures. A study that was "
     "interrupted goes on where it stopped. With a scene instead of a study, samples against time "
-    "and quality are measured, beside rays. --compare tells what changed between two studies "
-    "beyond noise.",
+    "and quality are measured, beside rays. --point-blocks measures models of points made of "
+    "files: DIR/*.csv has sizes, phases, what is culled and more, a table each. --compare tells "
+    "what changed between two studies beyond noise.",
     {"stipple study scenes/studies/samples-vs-time.study.json -o out/study",
-     "stipple study tree.glb -o out/tree-study", "stipple study --compare out/before out/after"}};
+     "stipple study tree.glb -o out/tree-study",
+     "stipple study --point-blocks dragon.glb oak.glb -o out/point-blocks",
+     "stipple study --compare out/before out/after"}};
 
 std::string rowsPath(const std::string& folder) {
     return (std::filesystem::path(folder) / "rows.csv").string();
@@ -45,6 +49,29 @@ ExitCode runCompareStudies(const std::vector<std::string>& folders, const std::s
     if (!json_path.empty()) saveFile(json_path, json);
     std::cout << text;
     return ExitCode::kDone;
+}
+
+void studyPointBlocks(BlockStudyOptions options, bool quiet, const std::string& json_path) {
+    std::error_code error;
+    std::filesystem::create_directories(options.folder, error);
+    if (error) throw Error(ErrorCode::kIo, options.folder, error.message());
+    Progress progress(quiet);
+    options.cancel = &cancelOnSignals();
+    options.progress = [&](const std::string& phase, double fraction) {
+        progress.update(phase, fraction);
+    };
+    Diagnostics diagnostics;
+    const std::vector<StudyTable> tables = runBlockStudy(options, diagnostics);
+    progress.finish();
+    for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
+    const std::filesystem::path folder(options.folder);
+    for (const StudyTable& table : tables)
+        saveFile((folder / (table.name + ".csv")).string(), tableCsv(table));
+    const std::string text = blockStudyJson(tables, options);
+    if (!json_path.empty()) saveFile(json_path, text);
+    const std::string report = (folder / "report.html").string();
+    saveFile(report, blockStudyPage(text, options));
+    std::cout << report << "\n";
 }
 
 void printAnswers(const StudySummary& summary) {
@@ -70,6 +97,7 @@ ExitCode runStudyCommand(const std::vector<std::string>& arguments) {
     std::string input, json;
     StudyOptions options;
     std::vector<std::string> compared;
+    BlockStudyOptions blocks;
     bool quiet = false;
     app.add_option("STUDY", input, "*.study.json, or a scene or model for the standard study")
         ->group("Arguments");
@@ -83,6 +111,15 @@ ExitCode runStudyCommand(const std::vector<std::string>& arguments) {
         ->type_name("BEFORE AFTER")
         ->expected(2)
         ->group("Results");
+    app.add_option("--point-blocks", blocks.assets,
+                   "models and scenes to make models of points of, and to measure these")
+        ->type_name("ASSET...")
+        ->group("Point blocks");
+    app.add_option("--resolution", blocks.resolution,
+                   "pixels along these models, and along their pictures (default 256)")
+        ->type_name("N")
+        ->check(CLI::Range(16, 1024).description(""))
+        ->group("Point blocks");
     app.add_flag("--allow-outside", options.allow_outside, "let the scene's paths leave its folder")
         ->group("Running");
     app.add_flag("-q,--quiet", quiet, "no progress, only warnings and errors")->group("Running");
@@ -93,6 +130,18 @@ ExitCode runStudyCommand(const std::vector<std::string>& arguments) {
             throw Error(ErrorCode::kInvalidArgument, "--compare", "takes two folders and no study");
         return runCompareStudies(compared, json);
     }
+    if (!blocks.assets.empty()) {
+        if (!input.empty())
+            throw Error(ErrorCode::kInvalidArgument, "--point-blocks", "takes models and no study");
+        if (options.folder.empty())
+            throw Error(ErrorCode::kInvalidArgument, "--output", "is required");
+        blocks.folder = options.folder;
+        blocks.allow_outside = options.allow_outside;
+        studyPointBlocks(blocks, quiet, json);
+        return ExitCode::kDone;
+    }
+    if (app.count("--resolution"))
+        throw Error(ErrorCode::kInvalidArgument, "--resolution", "needs --point-blocks");
     if (input.empty()) throw Error(ErrorCode::kInvalidArgument, "", "STUDY is required");
     if (options.folder.empty()) throw Error(ErrorCode::kInvalidArgument, "--output", "is required");
 

@@ -132,17 +132,13 @@ std::string studyJson(const Study& study, const StudySummary& summary,
            "\n";
 }
 
-std::string studyPage(const Study& study, const std::string& json, const std::string& folder) {
+std::string reportPage(const std::string& json,
+                       const std::map<std::string, std::string>& pictures) {
     std::string images = "{";
-    std::set<std::string> names;
-    for (const int c : picturedCases(study)) {
-        names.insert(studyRowId(study, study.cases[size_t(c)], 0));
-        names.insert(studyReferenceId(study, study.cases[size_t(c)]));
-    }
-    for (const std::string& name : names) {
-        const std::string bytes = readBytes(studyPicturePath(folder, name));
+    for (const auto& [id, path] : pictures) {
+        const std::string bytes = readBytes(path);
         if (bytes.empty()) continue;
-        images += (images.size() > 1 ? ",\n" : "") + ("\"" + name + "\":\"data:image/png;base64,") +
+        images += (images.size() > 1 ? ",\n" : "") + ("\"" + id + "\":\"data:image/png;base64,") +
                   base64(bytes) + "\"";
     }
     images += "}";
@@ -153,6 +149,16 @@ std::string studyPage(const Study& study, const std::string& json, const std::st
     replaceAll(page, "/*STUDY*/null", data);
     replaceAll(page, "/*IMAGES*/{}", images);
     return page;
+}
+
+std::string studyPage(const Study& study, const std::string& json, const std::string& folder) {
+    std::map<std::string, std::string> pictures;
+    for (const int c : picturedCases(study)) {
+        const StudyCase& one = study.cases[size_t(c)];
+        for (const std::string& id : {studyRowId(study, one, 0), studyReferenceId(study, one)})
+            pictures[id] = studyPicturePath(folder, id);
+    }
+    return reportPage(json, pictures);
 }
 
 }  // namespace stipple

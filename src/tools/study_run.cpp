@@ -57,17 +57,6 @@ const char* measureName(StudyMeasure measure) {
                                              : "frames";
 }
 
-std::string machineName(int threads) {
-    std::ifstream file("/proc/cpuinfo");
-    std::string name = "unknown processor";
-    for (std::string line; std::getline(file, line);) {
-        if (!line.starts_with("model name")) continue;
-        name = line.substr(std::min(line.size(), line.find(':') + 2));
-        break;
-    }
-    return name + ", " + std::to_string(threads) + " threads";
-}
-
 std::string timeText() {
     const std::time_t now = std::time(nullptr);
     std::tm utc{};
@@ -351,6 +340,17 @@ private:
 };
 
 }  // namespace
+
+std::string machineName(int threads) {
+    std::ifstream file("/proc/cpuinfo");
+    std::string name = "unknown processor";
+    for (std::string line; std::getline(file, line);) {
+        if (!line.starts_with("model name")) continue;
+        name = line.substr(std::min(line.size(), line.find(':') + 2));
+        break;
+    }
+    return name + ", " + std::to_string(threads) + " threads";
+}
 
 std::string studyRowId(const Study& study, const StudyCase& one, int repetition) {
     uint64_t key = hashText(1, study.sweeps[size_t(one.sweep)].name);

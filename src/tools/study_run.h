@@ -18,6 +18,9 @@ struct StudyOptions {
     std::function<void(const std::string& phase, double fraction)> progress;
 };
 
+// The processor, and how many threads: for tables.
+std::string machineName(int threads);
+
 // The row of a case and a repetition: what is the same whenever it is measured.
 std::string studyRowId(const Study& study, const StudyCase& one, int repetition);
 

@@ -840,6 +840,16 @@ case_study() {
     expect_ok study --help
 }
 
+case_study_point_blocks() {
+    write_scene
+    expect_ok study --point-blocks scene.scene.json -o result --resolution 16 --json out.json
+    expect_stdout '^result/report\.html$'
+    [[ $(ls result/*.csv | wc -l) == 9 ]] || fail "not nine tables"
+    grep -q '^scene.scene,' result/models.csv || fail "no row of the model"
+    grep -q '"name": "culling"' out.json || fail "a table is not in the JSON"
+    expect_error 2 'no study' study x.study.json --point-blocks scene.scene.json -o result
+}
+
 case_study_errors() {
     write_study
     expect_error 2 'STUDY' study -o result

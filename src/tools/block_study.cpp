@@ -1,0 +1,523 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <tools/block_study.h>
+
+#include <core/image.h>
+#include <render/build_model.h>
+#include <render/compare.h>
+#include <render/point_block_probe.h>
+#include <render/renderer.h>
+#include <scenegraph/io/load.h>
+#include <scenegraph/io/surfel_file.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <set>
+
+namespace stipple {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kViews = 4;       // of a model, evenly among the mask directions
+constexpr int kCullViews = 26;  // of a model, for shares of blocks
+constexpr int kFrames = kBlockStudyFrames;
+constexpr double kEyeDistance = 4.0;  // from the middle, in radii
+constexpr double kSteps = 36.0;       // of an asset, for progress
+
+// How models are built, by what the thesis calls it.
+struct Variant {
+    std::string what, value;
+    std::vector<std::pair<std::string, std::string>> set;
+};
+
+std::vector<Variant> sizeVariants() {
+    std::vector<Variant> variants;
+    // As the thesis builds: blocks as they come, whole.
+    const auto add = [&](const std::string& what, const std::string& key,
+                         const std::vector<std::string>& values, bool as_thesis,
+                         std::vector<std::pair<std::string, std::string>> set) {
+        if (as_thesis) set.insert(set.end(), {{"scored", "off"}, {"partial", "off"}});
+        for (const std::string& value : values) {
+            variants.push_back({what + (as_thesis ? ", as the thesis" : ""), value, set});
+            variants.back().set.emplace_back(key, value);
+        }
+    };
+    add("tolerance angle", "tolerance_angle", {"0", "15", "25", "35", "45"}, true, {});
+    add("tolerance angle, squares", "tolerance_angle", {"0", "15", "25", "35", "45"}, true,
+        {{"lattice", "squares"}});
+    add("block size", "block_size", {"4", "8", "16", "32"}, true, {});
+    add("tolerance angle", "tolerance_angle", {"0", "15", "35", "45"}, false, {});
+    add("tolerance angle, squares", "tolerance_angle", {"25", "45"}, false,
+        {{"lattice", "squares"}});
+    add("block size", "block_size", {"4", "16"}, false, {});
+    return variants;
+}
+
+struct Asset {
+    std::string name;
+    Scene source;
+};
+
+// A model and a scene that shows it.
+struct Built {
+    SurfelModel model;
+    PointBlockReport report;
+    size_t bytes = 0;  // of the file
+    Scene scene;
+};
+
+struct Timed {
+    double seconds = 1e9, draw = 1e9, finish = 1e9;
+    Image image;
+};
+
+class BlockStudy {
+public:
+    BlockStudy(const BlockStudyOptions& options, Diagnostics& diagnostics)
+        : options_(options), diagnostics_(diagnostics) {
+        fs::create_directories(fs::path(options.folder) / "models");
+        fs::create_directories(fs::path(options.folder) / "pictures");
+    }
+
+    std::vector<StudyTable> run() {
+        std::set<std::string> names;
+        for (const std::string& path : options_.assets) {
+            Asset asset;
+            asset.name = fs::path(path).stem().string();
+            if (!names.insert(asset.name).second)
+                throw Error(ErrorCode::kInvalidArgument, path, "another asset has the same name");
+            asset.source =
+                loadScene(path, {options_.allow_outside, 0, options_.cancel}, pool_, diagnostics_);
+            // The same light for all.
+            asset.source.lighting.suns = {{glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(2.0f)}};
+            asset.source.lighting.points.clear();
+            measure(asset);
+            ++assets_done_;
+        }
+        addMeans(sizes_);
+        addMeans(visibility_);
+        addMeans(screen_);
+        addMeans(projections_);
+        return {models_, phases_,      culling_, sizes_,  visibility_,
+                screen_, projections_, quality_, shadows_};
+    }
+
+private:
+    void progress() {
+        if (options_.cancel && options_.cancel->requested)
+            throw Error(ErrorCode::kCancelled, "", "cancelled");
+        if (options_.progress) {
+            options_.progress("measure", (double(assets_done_) + double(steps_done_) / kSteps) /
+                                             double(options_.assets.size()));
+        }
+        ++steps_done_;
+    }
+
+    Built build(const Asset& asset, const std::vector<std::pair<std::string, std::string>>& set,
+                const std::string& name) {
+        PointBlockOptions options;
+        options.resolution = options_.resolution;
+        for (const auto& [key, value] : set) applyOption(options, key, value);
+        Built built;
+        built.model = buildPointBlockModel(
+            asset.source, options, pool_, options_.cancel ? *options_.cancel : never_,
+            [](double) {}, built.report);
+        built.model.source = asset.name;
+        show(asset, built, name);
+        return built;
+    }
+
+    // The scene of a model, by way of its file.
+    void show(const Asset& asset, Built& built, const std::string& name) {
+        const std::string text = surfelFileText(built.model);
+        built.bytes = text.size();
+        const std::string path =
+            (fs::path(options_.folder) / "models" / (name + ".stipple")).string();
+        saveFile(path, text);
+        built.scene = loadScene(path, {true, 0, options_.cancel}, pool_, diagnostics_);
+        built.scene.lighting = asset.source.lighting;
+    }
+
+    // At unit magnification: a pixel at the near side is as large as one of the model.
+    Camera camera(const Asset& asset, int view, int views, double zoom = 1.0) const {
+        const DBox3 bounds = sceneBounds(asset.source);
+        const DVec3 center = 0.5 * (bounds.min + bounds.max);
+        const double radius = 0.5 * glm::length(bounds.max - bounds.min);
+        const Vec3 from = maskDirectionOf((view * kMaskDirections + 37) / views % kMaskDirections);
+        Camera camera = lookAt(center + DVec3(from) * radius * kEyeDistance, center);
+        const double pixel = 2.0 * radius / options_.resolution / zoom;
+        camera.fov_y =
+            2.0 * std::atan(0.5 * options_.resolution * pixel / ((kEyeDistance - 1.0) * radius));
+        camera.near_z = 0.01 * radius;
+        return camera;
+    }
+
+    RenderSettings settings() const {
+        RenderSettings s;
+        s.width = s.height = options_.resolution;
+        s.subpixels = 1;
+        return s;
+    }
+    View viewOf(const Camera& camera) const {
+        return makeView(camera, options_.resolution, options_.resolution, 1);
+    }
+
+    Timed draw(const Scene& scene, const Camera& camera, const RenderSettings& settings,
+               int frames = kFrames) {
+        Renderer renderer(scene, one_thread_);
+        FrameRequest request;
+        request.camera = camera;
+        request.settings = settings;
+        request.cancel = options_.cancel;
+        Timed timed;
+        for (int f = 0; f < frames; ++f) {
+            const Frame frame = renderer.render(request);
+            if (frame.stats.seconds < timed.seconds) {
+                timed.seconds = frame.stats.seconds;
+                for (const auto& [phase, seconds] : frame.stats.phases) {
+                    if (phase == "draw") timed.draw = seconds;
+                    if (phase == "reconstruct") timed.finish = seconds;
+                }
+            }
+        }
+        // The picture with what comparing asks for.
+        request.aovs = {"depth", "coverage"};
+        timed.image = renderer.render(request).image;
+        return timed;
+    }
+
+    Image rays(const Scene& scene, const Camera& camera, int rays) {
+        Renderer renderer(scene, pool_);
+        FrameRequest request;
+        request.camera = camera;
+        request.settings = settings();
+        request.settings.method = Method::kRaycast;
+        request.settings.samples = rays;
+        request.aovs = {"depth", "coverage"};
+        request.cancel = options_.cancel;
+        return renderer.render(request).image;
+    }
+
+    struct Drawn {
+        double ms = 0.0, psnr = 0.0, holes = 0.0;  // means; holes: the sum
+    };
+    Drawn drawViews(const Asset& asset, const Scene& scene, const RenderSettings& settings,
+                    double zoom = 1.0) {
+        Drawn drawn;
+        for (int v = 0; v < kViews; ++v) {
+            const Camera eye = camera(asset, v, kViews, zoom);
+            const Timed timed = draw(scene, eye, settings);
+            drawn.ms += timed.seconds * 1e3 / kViews;
+            drawn.psnr +=
+                compareImages(timed.image, rays(asset.source, eye, 1), pool_).psnr / kViews;
+            drawn.holes +=
+                double(compareImages(timed.image, rays(asset.source, eye, 16), pool_).holes->count);
+        }
+        return drawn;
+    }
+
+    void measure(Asset& asset) {
+        steps_done_ = 0;
+        progress();
+        const Built built = build(asset, {}, asset.name);
+        measureModel(asset, built);
+        measurePhases(asset, built);
+        measureCulling(asset, built);
+        measureVisibility(asset, built);
+        measureQuality(asset, built);
+        measureShadows(asset, built);
+        measureProjections(asset, built);
+        measureSizes(asset, built);
+    }
+
+    void measureModel(const Asset& asset, const Built& built) {
+        progress();
+        const Drawn drawn = drawViews(asset, built.scene, settings());
+        const SurfelLevel& level = built.model.levels[0];
+        models_.rows.push_back(
+            {{asset.name},
+             {double(built.bytes) / 1e6, double(level.blocks.size()), double(level.size()),
+              built.report.per_pixel, built.report.seconds, drawn.ms, drawn.psnr, drawn.holes}});
+        const Camera eye = camera(asset, 0, kViews);
+        const auto path = [&](const char* kind) {
+            return (fs::path(options_.folder) / "pictures" / (asset.name + kind)).string();
+        };
+        saveImage(draw(built.scene, eye, settings(), 1).image, path(".points.png"));
+        saveImage(rays(asset.source, eye, 1), path(".rays.png"));
+    }
+
+    void measurePhases(const Asset& asset, const Built& built) {
+        progress();
+        RenderSettings s = settings();
+        std::vector<double> sums(7, 0.0);
+        for (int v = 0; v < kViews; ++v) {
+            const Camera eye = camera(asset, v, kViews);
+            const WarpSeconds warp = measureWarp(built.scene, built.model, built.model.levels[0],
+                                                 viewOf(eye), s, kFrames);
+            const Timed whole = draw(built.scene, eye, s);
+            RenderSettings unfilled = s;
+            unfilled.fill = false;
+            const Timed without_fill = draw(built.scene, eye, unfilled);
+            RenderSettings pull_push = s;
+            pull_push.reconstruct = Reconstruct::kPullPush;
+            const Timed filled = draw(built.scene, eye, pull_push);
+            const double seconds[7] = {warp.visibility,        warp.warp - warp.visibility,
+                                       whole.draw - warp.warp, whole.finish - without_fill.finish,
+                                       without_fill.finish,    whole.seconds,
+                                       filled.seconds};
+            for (size_t i = 0; i < 7; ++i) sums[i] += seconds[i] * 1e3 / kViews;
+        }
+        phases_.rows.push_back({{asset.name}, sums});
+    }
+
+    void measureCulling(const Asset& asset, const Built& built) {
+        progress();
+        CulledShares sum;
+        std::vector<double> by_screen(7, 0.0);
+        for (int v = 0; v < kCullViews; ++v) {
+            const View view = viewOf(camera(asset, v, kCullViews));
+            const SurfelLevel& level = built.model.levels[0];
+            const CulledShares shares = culledShares(built.model, level, view);
+            sum.cone += shares.cone, sum.mask += shares.mask, sum.both += shares.both;
+            for (int n = 0; n < 7; ++n)
+                by_screen[size_t(n)] += culledByScreen(built.model, level, view, n);
+        }
+        const double percent = 100.0 / kCullViews;
+        culling_.rows.push_back(
+            {{asset.name}, {0.0, sum.cone * percent, sum.mask * percent, sum.both * percent}});
+        for (size_t n = 0; n < by_screen.size(); ++n)
+            screen_.rows.push_back({{asset.name, std::to_string(n)}, {by_screen[n] * percent}});
+        screen_.rows.push_back({{asset.name, "each block"}, {sum.mask * percent}});
+    }
+
+    void measureVisibility(const Asset& asset, const Built& built) {
+        for (const bool cones : {false, true}) {
+            for (const int directions : {0, 32, 128}) {
+                progress();
+                Built limited;
+                limited.model = built.model;
+                limitVisibility(limited.model, cones, directions);
+                show(asset, limited, asset.name + "-limited");
+                double culled = 0.0, ms = 0.0, warp_ms = 0.0;
+                for (int v = 0; v < kCullViews; ++v) {
+                    culled += culledShares(limited.model, limited.model.levels[0],
+                                           viewOf(camera(asset, v, kCullViews)))
+                                  .both *
+                              100.0 / kCullViews;
+                }
+                for (int v = 0; v < kViews; ++v) {
+                    const Camera eye = camera(asset, v, kViews);
+                    ms += draw(limited.scene, eye, settings()).seconds * 1e3 / kViews;
+                    warp_ms += measureWarp(limited.scene, limited.model, limited.model.levels[0],
+                                           viewOf(eye), settings(), kFrames)
+                                   .warp *
+                               1e3 / kViews;
+                }
+                visibility_.rows.push_back(
+                    {{asset.name,
+                      std::string(cones ? "cones" : "no cones") + ", " +
+                          (directions ? std::to_string(directions) + " directions" : "no masks")},
+                     {culled, warp_ms, ms}});
+            }
+        }
+        fs::remove(fs::path(options_.folder) / "models" / (asset.name + "-limited.stipple"));
+    }
+
+    void addQuality(const Asset& asset, const Scene& scene, const std::string& drawn,
+                    const std::string& how, RenderSettings s) {
+        s.reconstruct = Reconstruct::kPullPush;
+        const Camera eye = camera(asset, 0, kViews);
+        const Timed timed = draw(scene, eye, s, 4);
+        const CompareResult result = compareImages(timed.image, rays(asset.source, eye, 16), pool_);
+        quality_.rows.push_back(
+            {{asset.name, drawn, how},
+             {result.psnr, result.flip, double(result.holes->count), timed.seconds * 1e3}});
+    }
+
+    void measureQuality(const Asset& asset, const Built& built) {
+        progress();
+        RenderSettings squares = settings(), unlimited = settings();
+        squares.pull_push_coverage = PullPushCoverage::kSquares;
+        unlimited.pull_push_threshold = false;
+        // Triangles must come as points, or there is nothing to fill.
+        const auto asPoints = [](RenderSettings s) {
+            s.area_threshold = s.large_triangle = 1e6;
+            return s;
+        };
+        Scene backs = built.scene;
+        for (Material& material : backs.materials) material.double_sided = true;
+        addQuality(asset, built.scene, "model", "all as it is", settings());
+        addQuality(asset, backs, "model", "backs stay", settings());
+        addQuality(asset, asset.source, "mesh", "all as it is", asPoints(settings()));
+        addQuality(asset, asset.source, "mesh", "opaque squares", asPoints(squares));
+        addQuality(asset, asset.source, "mesh", "no depth threshold", asPoints(unlimited));
+    }
+
+    void measureShadows(const Asset& asset, const Built& built) {
+        progress();
+        Scene lit = built.scene;
+        const Vec3 directions[3] = {{0.4f, 0.7f, 0.5f}, {-0.6f, 0.5f, 0.3f}, {0.1f, 0.4f, -0.8f}};
+        lit.lighting.suns.clear();
+        for (int n = 1; n <= 3; ++n) {
+            lit.lighting.suns.push_back({glm::normalize(directions[n - 1]), Vec3(2.0f / float(n))});
+            RenderSettings s = settings();
+            const double without = draw(lit, camera(asset, 0, kViews), s).seconds * 1e3;
+            s.shadows = true;
+            const double with = draw(lit, camera(asset, 0, kViews), s).seconds * 1e3;
+            shadows_.rows.push_back({{asset.name, std::to_string(n)},
+                                     {without, with, (with - without) / n / without * 100.0}});
+        }
+    }
+
+    void measureProjections(const Asset& asset, const Built& built) {
+        for (const char* directions : {"6", "32", "128"}) {
+            progress();
+            const bool is_default = std::string(directions) == "32";
+            Built other;
+            if (!is_default) other = build(asset, {{"directions", directions}}, "variant");
+            const Built& b = is_default ? built : other;
+            const Drawn drawn = drawViews(asset, b.scene, settings());
+            projections_.rows.push_back(
+                {{asset.name, directions},
+                 {double(b.model.levels[0].size()), double(b.model.levels[0].blocks.size()),
+                  b.report.seconds, drawn.ms, drawn.psnr, drawn.holes}});
+        }
+    }
+
+    // Sizes and times relative to the model as it is built by default.
+    void measureSizes(const Asset& asset, const Built& built) {
+        const auto drawSeconds = [&](const Scene& scene) {
+            double seconds = 0.0;
+            for (int v = 0; v < kViews; ++v)
+                seconds += draw(scene, camera(asset, v, kViews), settings()).seconds / kViews;
+            return seconds;
+        };
+        const double default_seconds = drawSeconds(built.scene);
+        const auto add = [&](const std::string& what, const std::string& value, const Built& b,
+                             double seconds) {
+            sizes_.rows.push_back(
+                {{asset.name, what, value},
+                 {double(b.model.levels[0].size()), double(b.model.levels[0].blocks.size()),
+                  double(b.bytes) / double(built.bytes), seconds / default_seconds,
+                  b.report.seconds}});
+        };
+        for (const char* what : {"tolerance angle", "block size"})
+            add(what, std::string(what) == "block size" ? "8" : "25", built, default_seconds);
+        for (const Variant& variant : sizeVariants()) {
+            progress();
+            const Built b = build(asset, variant.set, "variant");
+            add(variant.what, variant.value, b, drawSeconds(b.scene));
+        }
+        fs::remove(fs::path(options_.folder) / "models" / "variant.stipple");
+    }
+
+    // Rows of means over the assets, by all labels but the first.
+    static void addMeans(StudyTable& table) {
+        std::vector<StudyTableRow> means;
+        std::vector<double> counts;
+        for (const StudyTableRow& row : table.rows) {
+            std::vector<std::string> labels = row.labels;
+            labels[0] = "mean";
+            const auto found = std::find_if(means.begin(), means.end(), [&](const auto& mean) {
+                return mean.labels == labels;
+            });
+            const size_t k = size_t(found - means.begin());
+            if (found == means.end()) {
+                means.push_back({labels, std::vector<double>(row.values.size(), 0.0)});
+                counts.push_back(0.0);
+            }
+            for (size_t i = 0; i < row.values.size(); ++i) means[k].values[i] += row.values[i];
+            counts[k] += 1.0;
+        }
+        for (size_t k = 0; k < means.size(); ++k) {
+            for (double& value : means[k].values) value /= counts[k];
+        }
+        table.rows.insert(table.rows.begin(), means.begin(), means.end());
+    }
+
+    const BlockStudyOptions& options_;
+    Diagnostics& diagnostics_;
+    ThreadPool pool_, one_thread_{1};
+    const CancelFlag never_;
+    size_t assets_done_ = 0, steps_done_ = 0;
+
+    StudyTable models_ = {
+        "models",
+        "Models (thesis: table 8.1)",
+        "Size of the file, blocks and points of the finest level, points a pixel "
+        "of the surface at unit magnification, building; frames at unit "
+        "magnification, against one centred ray; holes of all views against 16.",
+        {"model"},
+        {"MB", "blocks", "points", "points_per_pixel", "build_s", "frame_ms", "psnr_db", "holes"},
+        {}};
+    StudyTable phases_ = {"phases",
+                          "Milliseconds by phase (thesis: table 8.2)",
+                          "One thread. Visibility: cones and masks of all blocks. Warp: points to "
+                          "camera space. Depth: into the z-buffer, what is hidden left out (below "
+                          "0 where that saves warping). Gaps: found and filled. Shade: looked up, "
+                          "shaded, written. Last, the whole frame by pull and push.",
+                          {"model"},
+                          {"visibility_ms", "warp_ms", "depth_ms", "gaps_ms", "shade_ms",
+                           "total_ms", "pull_push_total_ms"},
+                          {}};
+    StudyTable culling_ = {"culling",
+                           "Per cent of blocks culled (thesis: table 8.3)",
+                           "Means of views from everywhere.",
+                           {"model"},
+                           {"neither", "cone", "mask", "both"},
+                           {}};
+    StudyTable sizes_ = {"sizes",
+                         "Size and time over tolerance angle, block size and lattice (thesis: "
+                         "figures 5.5, 5.6, 5.7)",
+                         "Relative to the model as it is built by default. As the thesis: whole "
+                         "blocks, taken as they come; else single samples that others make up for "
+                         "are left out.",
+                         {"model", "what", "value"},
+                         {"points", "blocks", "size", "time", "build_s"},
+                         {}};
+    StudyTable visibility_ = {"visibility",
+                              "Cones and bits of masks (thesis: figure 6.7)",
+                              "Blocks left out, milliseconds of visibility and warp, and of the "
+                              "frame.",
+                              {"model", "tests"},
+                              {"culled_percent", "warp_ms", "frame_ms"},
+                              {}};
+    StudyTable screen_ = {"screen",
+                          "Masks over the screen's subdivision (thesis: figure 6.8)",
+                          "Per cent of blocks culled by masks alone, the screen in 2^n x 2^n parts "
+                          "with a mask each; and with each block's own direction, as drawn here.",
+                          {"model", "n"},
+                          {"culled_percent"},
+                          {}};
+    StudyTable projections_ = {"projections",
+                               "Number of projections (thesis: section 5.1)",
+                               "",
+                               {"model", "projections"},
+                               {"points", "blocks", "build_s", "frame_ms", "psnr_db", "holes"},
+                               {}};
+    StudyTable quality_ = {"quality",
+                           "Coverage, depth threshold and backs with pull and push (thesis: "
+                           "figures 4.9, 7.2, 7.6)",
+                           "Against 16 rays a pixel. Models leave no gaps at unit magnification, "
+                           "so coverage and threshold are shown by points drawn anew on the mesh.",
+                           {"model", "drawn", "how"},
+                           {"psnr_db", "flip", "holes", "frame_ms"},
+                           {}};
+    StudyTable shadows_ = {"shadows",
+                           "What shadows cost (thesis: figure 7.4)",
+                           "Suns; the last column is per cent of the frame without shadows, for "
+                           "each light.",
+                           {"model", "lights"},
+                           {"without_ms", "with_ms", "percent_a_light"},
+                           {}};
+};
+
+}  // namespace
+
+std::vector<StudyTable> runBlockStudy(const BlockStudyOptions& options, Diagnostics& diagnostics) {
+    return BlockStudy(options, diagnostics).run();
+}
+
+}  // namespace stipple
