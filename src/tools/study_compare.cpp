@@ -121,6 +121,8 @@ std::string compareStudies(const std::vector<StudyRow>& before_rows,
                 changes.push_back({nameOf(key, seen), column, a, b});
         }
     }
+    if (n_common == 0)
+        throw Error(ErrorCode::kInvalidArgument, "", "the two studies have no case in common");
     std::sort(changes.begin(), changes.end(), [](const Change& a, const Change& b) {
         return std::abs(a.relative()) > std::abs(b.relative());
     });

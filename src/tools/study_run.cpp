@@ -364,6 +364,7 @@ std::string studyRowId(const Study& study, const StudyCase& one, int repetition)
         key = hashText(key, info.key);
         key = hashText(key, settingValue(one.settings, info.key));
     }
+    key = hashCombine(key, uint64_t(study.later_frames));
     return hexText(hashCombine(key, uint64_t(repetition), uint64_t(study.reference_rays)));
 }
 
@@ -373,7 +374,9 @@ std::string studyReferenceId(const Study& study, const StudyCase& one) {
     key = hashCombine(key, uint64_t(one.nest), uint64_t(one.settings.width),
                       uint64_t(one.settings.height));
     key = hashText(key, numberText(one.zoom) + (one.settings.shadows ? " shadows" : ""));
-    key = hashText(key, settingValue(one.settings, "exposure"));
+    for (const char* setting : {"exposure", "ao", "ao_radius", "ao_rays"})
+        key = hashText(key, settingValue(one.settings, setting));
+    key = hashCombine(key, uint64_t(study.nest_grid));
     return "reference-" + hexText(hashCombine(key, uint64_t(study.reference_rays)));
 }
 

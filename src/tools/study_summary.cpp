@@ -163,9 +163,11 @@ StudySummary summarizeStudy(const Study& study, const std::vector<StudyRow>& row
             series->points.push_back({summarize(x), summarize(y), caseLabel(one)});
         }
         for (StudySeries& series : lines.series) {
-            std::stable_sort(
-                series.points.begin(), series.points.end(),
-                [](const StudyPoint& a, const StudyPoint& b) { return a.x.value < b.x.value; });
+            // Measured times come in any order: their line follows the sweep.
+            if (!plot.x.ends_with("_seconds"))
+                std::stable_sort(
+                    series.points.begin(), series.points.end(),
+                    [](const StudyPoint& a, const StudyPoint& b) { return a.x.value < b.x.value; });
             addFit(plot, series, lines.notes);
         }
         if (!lines.series.empty()) addCurve(plot, lines);

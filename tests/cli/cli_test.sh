@@ -859,6 +859,8 @@ case_study_errors() {
     expect_error 3 "/sweeps/0/axes/sampels/0.*did you mean 'samples'" study bad.study.json -o result
     sed 's/"points_drawn"/"points_drwan"/' ball.study.json >bad.study.json
     expect_error 3 '/plots/0/x.*"points_drawn"' study bad.study.json -o result
+    sed 's/"points_drawn"/"sampler"/' ball.study.json >bad.study.json
+    expect_error 3 '/plots/0/x.*"sampler" is a word' study bad.study.json -o result
     sed 's/"repetitions": 3/"repetitions": 0/' ball.study.json >bad.study.json
     expect_error 3 '/repetitions' study bad.study.json -o result
     sed 's/"zoom": \[1, 2\]/"camera": ["side"]/' ball.study.json >bad.study.json
@@ -901,6 +903,9 @@ out.writeheader(); out.writerows(rows)
 PY
     expect_ok study --compare one two
     expect_stdout 'points_drawn .* \+100.0 %'
+    sed 's/"width": 32/"width": 30/; s/"repetitions": 3/"repetitions": 1/' ball.study.json >other.study.json
+    expect_ok study other.study.json -o other
+    expect_error 2 'no case in common' study --compare one other
 }
 
 # Groups of groups, edited at every level between frames: what is cached is what would be drawn anew.
