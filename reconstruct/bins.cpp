@@ -123,22 +123,25 @@ private:
         c.depth = block.z[i];
         c.faces_eye = glm::dot(normal, view.orthographic ? Vec3(0, 0, 1) : p_camera) < 0.0f;
         c.is_closed = is_wide;
-        bool is_shaded = false;
+        bool is_known = false;
         for (int y = std::max(y0, binned_.y0); y < std::min(y0 + side, binned_.y1); ++y) {
             for (int x = std::max(x0, binned_.x0); x < std::min(x0 + side, binned_.x1); ++x) {
-                if (layers_.hides(x, y, c.depth)) continue;
-                if (!is_shaded) shader_.showPoint(*lookup_, p_camera, block.number[i], p);
-                is_shaded = true;
-                add(x, y, c);
+                if (is_wide ? layers_.hides(x, y, c.depth) : isBehindFront(x, y, c.depth)) continue;
+                if (!is_known) lookUp(p_camera, block.number[i], p, c);
+                is_known = true;
+                layers_.add(x, y, c);
             }
         }
     }
 
-    // What the shader shows.
-    void add(int x, int y, Contribution& c) {
+    bool isBehindFront(int x, int y, float depth) const {
+        return depth > DepthTile::depthOf(means_.fronts().row(y)[x]);
+    }
+    // Alpha and radiance.
+    void lookUp(const Vec3& p_camera, uint32_t number, const Vec2& p_sub, Contribution& c) {
+        shader_.lookUp(*lookup_, p_camera, number, p_sub);
         c.alpha = std::clamp(shader_.sample().alpha, 0.0f, 1.0f);
-        c.radiance = shader_.radiance();
-        layers_.add(x, y, c);
+        c.radiance = c.alpha > 0.0f ? shader_.shadeSample(shader_.sample()) : Vec3(0);
     }
 
     void addTriangles(const TriangleBlock& block) {
@@ -146,23 +149,29 @@ private:
         for (int i = 0; i < block.count; ++i) {
             if (!(block.blended >> i & 1)) continue;
             const BlendedTriangle triangle(view, block, i);
+            const SubpixelRect bounds = triangle.bounds(binned_);
+            if (bounds.x0 >= bounds.x1 || bounds.y0 >= bounds.y1 ||
+                means_.fronts().hides(bounds, triangle.nearest()))
+                continue;
             Contribution c;
             c.q = triangle.plane().q, c.slope = triangle.plane().slope;
             c.at = triangle.plane().at;
             c.faces_eye = triangle.facesEye();
             c.is_closed = block.is_wide;
-            triangle.visit(binned_, [&](int x, int y, float depth) {
+            const auto isSeen = [&](int x, int y, float depth) {
+                return !isBehindFront(x, y, depth);
+            };
+            triangle.visit(bounds, isSeen, [&](int x, int y, float depth) {
                 const Vec2 middle(float(x) + 0.5f, float(y) + 0.5f);
-                // Where it is opaque the first pass has drawn it.
-                if (layers_.hides(x, y, depth) ||
-                    (block.mask && block.mask->isSurface(i, middle.x, middle.y)))
-                    return;
+                // Triangles are exact, nothing is closed beyond them. Most texels of a leaf's
+                // picture show nothing, and where it is opaque the first pass has drawn it.
+                const float alpha = block.mask ? block.mask->alpha(i, middle.x, middle.y) : 1.0f;
+                if (!(alpha > 0.0f) || (block.mask && alpha >= kOpaqueAlpha)) return;
                 Vec3 origin, direction;
                 view.ray(middle.x, middle.y, origin, direction);
-                shader_.showPoint(*lookup_, origin + direction * depth,
-                                  block.first_number + uint32_t(i), middle);
+                lookUp(origin + direction * depth, block.first_number + uint32_t(i), middle, c);
                 c.depth = depth;
-                add(x, y, c);
+                layers_.add(x, y, c);
             });
         }
     }

@@ -29,6 +29,7 @@ public:
         for (int k = 0; k < 3; ++k) {
             const Vec3 p = block.vertex(k, i);
             at_[k] = view.project(p);
+            nearest_ = std::min(nearest_, p.z);
             q[k] = orthographic_ ? p.z : 1.0f / p.z;
         }
         const Vec2 b = at_[1] - at_[0], c = at_[2] - at_[0];
@@ -46,48 +47,56 @@ public:
     // Counter-clockwise, y down.
     bool facesEye() const { return area_ < 0.0f; }
 
-    // Calls visit(x, y, depth) for the centres within.
-    template <class Visit>
-    void visit(const SubpixelRect& rect, const Visit& visit) const {
-        if (area_ == 0.0f) return;
+    float nearest() const { return nearest_; }  // depth
+
+    // The subpixels of `rect` around all centres that it may hold.
+    SubpixelRect bounds(const SubpixelRect& rect) const {
+        if (area_ == 0.0f) return {rect.x0, rect.y0, rect.x0, rect.y0};
         const auto bound = [](float v, int lo, int hi) {
             return int(std::ceil(std::clamp(v - 0.5f, float(lo), float(hi))));
         };
         const auto [x_lo, x_hi] = std::minmax({at_[0].x, at_[1].x, at_[2].x});
         const auto [y_lo, y_hi] = std::minmax({at_[0].y, at_[1].y, at_[2].y});
-        const int x0 = bound(x_lo, rect.x0, rect.x1),
-                  x1 = bound(std::nextafter(x_hi, 1e30f) + 1e-3f, rect.x0, rect.x1);
-        const int y0 = bound(y_lo, rect.y0, rect.y1),
-                  y1 = bound(std::nextafter(y_hi, 1e30f) + 1e-3f, rect.y0, rect.y1);
-        for (int y = y0; y < y1; ++y) {
-            for (int x = x0; x < x1; ++x) {
+        return {bound(x_lo, rect.x0, rect.x1), bound(y_lo, rect.y0, rect.y1),
+                bound(std::nextafter(x_hi, 1e30f) + 1e-3f, rect.x0, rect.x1),
+                bound(std::nextafter(y_hi, 1e30f) + 1e-3f, rect.y0, rect.y1)};
+    }
+    // Calls visit(x, y, depth) for the centres within, of bounds(), for which wants(x, y, depth).
+    template <class Wants, class Visit>
+    void visit(const SubpixelRect& bounds, const Wants& wants, const Visit& visit) const {
+        const Edge edges[] = {
+            {at_[0], at_[1], at_[2]}, {at_[1], at_[2], at_[0]}, {at_[2], at_[0], at_[1]}};
+        for (int y = bounds.y0; y < bounds.y1; ++y) {
+            for (int x = bounds.x0; x < bounds.x1; ++x) {
                 const Vec2 p(float(x) + 0.5f, float(y) + 0.5f);
-                if (!holds(p)) continue;
-                const float q = plane_.qAt(p);
-                if (q > 0.0f) visit(x, y, orthographic_ ? q : 1.0f / q);
+                const float q = plane_.qAt(p), depth = orthographic_ ? q : 1.0f / q;
+                if (q > 0.0f && wants(x, y, depth) && edges[0].holds(p) && edges[1].holds(p) &&
+                    edges[2].holds(p))
+                    visit(x, y, depth);
             }
         }
     }
 
 private:
-    bool holds(const Vec2& p) const {
-        return isInside(0, 1, 2, p) && isInside(1, 2, 0, p) && isInside(2, 0, 1, p);
-    }
     // Both triangles of an edge compute the same number of it; on the edge itself it belongs to the
     // one on its positive side.
-    bool isInside(int i, int j, int opposite, const Vec2& p) const {
-        Vec2 a = at_[i], b = at_[j];
-        if (std::pair(b.x, b.y) < std::pair(a.x, a.y)) std::swap(a, b);
-        const auto side = [&](const Vec2& v) {
-            return double(b.x - a.x) * double(v.y - a.y) - double(b.y - a.y) * double(v.x - a.x);
-        };
-        const double of_p = side(p);
-        return side(at_[opposite]) > 0.0 ? of_p >= 0.0 : of_p < 0.0;
-    }
+    struct Edge {
+        double x, y, dx, dy;
+        bool is_positive;  // the triangle's side
+
+        Edge(Vec2 a, Vec2 b, const Vec2& opposite) {
+            if (std::pair(b.x, b.y) < std::pair(a.x, a.y)) std::swap(a, b);
+            x = a.x, y = a.y, dx = double(b.x - a.x), dy = double(b.y - a.y);
+            is_positive = side(opposite) > 0.0;
+        }
+        double side(const Vec2& p) const { return dx * (double(p.y) - y) - dy * (double(p.x) - x); }
+        bool holds(const Vec2& p) const { return is_positive ? side(p) >= 0.0 : side(p) < 0.0; }
+    };
 
     const bool orthographic_;
     Vec2 at_[3];
     float area_ = 0.0f;
+    float nearest_ = kInfinity;
     PicturePlane plane_;
 };
 

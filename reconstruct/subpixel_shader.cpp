@@ -76,10 +76,15 @@ bool SubpixelShader::showMembers(const SampleLookup& lookup, const Cell& cell, u
 
 void SubpixelShader::showPoint(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
                                const Vec2& p_sub) {
+    lookUp(lookup, p_camera, number, p_sub);
+    radiance_ = shadeSample(sample_);
+}
+
+void SubpixelShader::lookUp(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
+                            const Vec2& p_sub) {
     sample_.depth = p_camera.z;
     sample_.position_camera = p_camera;
     lookup.lookUp(number & ~kSurfaceBit, p_sub.x, p_sub.y, sample_);
-    radiance_ = shadeSample(sample_);
     last_number_ = kNoNumber;
 }
 

@@ -29,6 +29,9 @@ public:
     // Surface and radiance of a point, whose position is known.
     void showPoint(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
                    const Vec2& p_sub);
+    // The surface alone, without its radiance.
+    void lookUp(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
+                const Vec2& p_sub);
     const SurfaceSample& sample() const { return sample_; }
     const Vec3& radiance() const { return radiance_; }
     // Radiance of a surface that was put together elsewhere.

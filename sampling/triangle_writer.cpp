@@ -57,24 +57,32 @@ public:
     Mask(const TileContext& context, const Run& run, const TriangleBlock& block)
         : context_(context), run_(run), block_(block) {}
     bool isSurface(int triangle, float sub_x, float sub_y) const override {
-        const Scene& scene = context_.scene;
-        const uint32_t t = run_.first_index + uint32_t(triangle);
-        const Mesh& mesh = scene.meshes[run_.child.index()];
-        const Material& material = scene.materials[mesh.triangle_material[t]];
+        const Material& material = materialOf(triangle);
         if (material.alpha_mode == AlphaMode::kOpaque) return true;
+        const float alpha = this->alpha(triangle, sub_x, sub_y);
+        if (material.alpha_mode == AlphaMode::kMask) return alpha >= material.alpha_cutoff;
+        if (context_.sink->wantsLayers()) return alpha >= kOpaqueAlpha;
+        const uint64_t place = hashCombine(run_.path, run_.first_index + uint32_t(triangle),
+                                           uint64_t(int64_t(sub_x)), uint64_t(int64_t(sub_y)));
+        return uniformFloat(hashCombine(context_.settings.seed, place)) < alpha;
+    }
+    float alpha(int triangle, float sub_x, float sub_y) const override {
         Vec3 origin, direction;
         context_.view.ray(sub_x, sub_y, origin, direction);
         const Vec2 uv = intersectPlane(block_.vertex(0, triangle), block_.vertex(1, triangle),
                                        block_.vertex(2, triangle), origin, direction);
-        const float alpha = alphaAt(mesh, scene.materials, scene.textures, t, uv.x, uv.y);
-        if (material.alpha_mode == AlphaMode::kMask) return alpha >= material.alpha_cutoff;
-        if (context_.sink->wantsLayers()) return alpha >= kOpaqueAlpha;
-        const uint64_t place =
-            hashCombine(run_.path, t, uint64_t(int64_t(sub_x)), uint64_t(int64_t(sub_y)));
-        return uniformFloat(hashCombine(context_.settings.seed, place)) < alpha;
+        const Scene& scene = context_.scene;
+        return alphaAt(mesh(), scene.materials, scene.textures,
+                       run_.first_index + uint32_t(triangle), uv.x, uv.y);
     }
 
 private:
+    const Mesh& mesh() const { return context_.scene.meshes[run_.child.index()]; }
+    const Material& materialOf(int triangle) const {
+        const uint32_t t = run_.first_index + uint32_t(triangle);
+        return context_.scene.materials[mesh().triangle_material[t]];
+    }
+
     const TileContext& context_;
     const Run& run_;
     const TriangleBlock& block_;

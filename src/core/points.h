@@ -127,6 +127,8 @@ class MaskTest {
 public:
     virtual ~MaskTest() = default;
     virtual bool isSurface(int triangle, float sub_x, float sub_y) const = 0;
+    // 0..1; of opaque triangles it means nothing.
+    virtual float alpha(int triangle, float sub_x, float sub_y) const = 0;
 };
 
 // Up to 64 triangles in camera space: too large for points, too small for the z-buffer of the large

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Panes of glass, a ball of mist and masked leaves against many rays that pass each layer by
+// Panes of glass, a ball of mist and canopies of leaves against many rays that pass each layer by
 // chance.
 #include "test_scene.h"
 
@@ -99,6 +99,71 @@ TEST(BinsImage, sameBitsForAnyThreadsAndWithoutCulling) {
     for (const int threads : {2, 7}) EXPECT_EQ(render(scene, r, threads).data, one.data);
     r.settings.culling = false;
     EXPECT_EQ(render(scene, r).data, one.data);
+}
+
+enum class Leaves { kOpaque, kTranslucent, kPictures };
+
+// Trees on a lattice, those far away finer than a pixel.
+Scene wood(Leaves leaves) {
+    TestScene t;
+    t.scene.lighting.suns.push_back({glm::normalize(Vec3(0.4f, 0.7f, 0.5f)), Vec3(2.5f)});
+    for (const char* species : {"oak", "spruce"}) {
+        TreeParams params;
+        params.species = species;
+        params.height = 14.0;
+        params.triangles = 6000;
+        GeneratedMesh tree = makeTree(params);
+        Material& leaf = tree.materials[1];
+        if (leaves != Leaves::kOpaque) leaf.alpha_mode = AlphaMode::kBlend;
+        if (leaves == Leaves::kTranslucent) leaf.alpha = 0.5f;
+        if (leaves == Leaves::kPictures) {
+            // Each leaf shows a round one with a soft border.
+            constexpr int kSide = 16;
+            Texture picture;
+            picture.levels.push_back({kSide, kSide, {}});
+            for (int i = 0; i < kSide * kSide; ++i) {
+                const float r = std::hypot(float(i % kSide) - 7.5f, float(i / kSide) - 7.5f);
+                const auto alpha = uint8_t(std::clamp(255.0f * (8.0f - r) / 3.0f, 0.0f, 255.0f));
+                picture.levels[0].rgba.insert(picture.levels[0].rgba.end(), {255, 255, 255, alpha});
+            }
+            buildMipmaps(picture);
+            leaf.base_texture = int(t.scene.textures.size());
+            t.scene.textures.push_back(std::move(picture));
+            // A corner of the picture for each corner of a leaf.
+            tree.mesh.uvs.resize(tree.mesh.positions.size());
+            for (size_t i = 0; i < tree.mesh.triangles.size(); ++i) {
+                const UVec3& corners = tree.mesh.triangles[i];
+                for (int k = 0; k < 3; ++k)
+                    tree.mesh.uvs[corners[k]] =
+                        Vec2(float(corners[k] % 4 / 2), float((corners[k] % 4 + 1) % 4 / 2));
+            }
+        }
+        addMesh(t.scene, std::move(tree));
+    }
+    for (int i = 0; i < 400; ++i) {
+        const double x = 6.0 * (i % 20 - 9.5) + 2.0 * std::sin(37.0 * i),
+                     z = -5.0 * (i / 20) + 2.0 * std::sin(91.0 * i);
+        t.root.instances.add(
+            ChildRef::mesh(uint32_t(i % 3 == 0)),
+            placed(DVec3(x, 0.0, z), DVec3(1.0 + 0.2 * std::sin(7.0 * i)), 2.4 * i));
+    }
+    t.add(makePrimitive("plane", 2, Vec3(0.35f, 0.3f, 0.2f)), placed(DVec3(0.0), DVec3(400.0)));
+    return std::move(t.build());
+}
+
+TEST(BinsImage, canopiesLookAsManyRaysSeeThem) {
+    ThreadPool pool(2);
+    for (const Leaves leaves : {Leaves::kOpaque, Leaves::kTranslucent, Leaves::kPictures}) {
+        const Scene scene = wood(leaves);
+        FrameRequest r = request(false);
+        r.camera = lookAt(DVec3(0.0, 26.0, 32.0), DVec3(0.0, 6.0, -16.0));
+        r.settings.width = 120;
+        r.settings.height = 90;
+        const Image points = render(scene, r);
+        r.settings.method = Method::kRaycast;
+        r.settings.samples = 256;
+        EXPECT_GE(compareImages(points, render(scene, r), pool).psnr, 30.0) << int(leaves);
+    }
 }
 
 }  // namespace
