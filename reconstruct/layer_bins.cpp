@@ -138,22 +138,27 @@ void LayerBins::add(int x, int y, const Contribution& c) {
 }
 
 void LayerBins::fillBins() {
-    order_.resize(added_.size());
-    std::iota(order_.begin(), order_.end(), 0u);
-    const auto key = [&](uint32_t i) {
-        const Added& a = added_[i];
-        return std::tuple(a.pixel, a.c.depth, a.cell, a.c.at.x, a.c.at.y, a.c.faces_eye, a.c.alpha,
+    // By pixel, then by what they are, as any order that depends on nothing else will do.
+    std::vector<uint32_t>& end = pixel_end_;
+    end.assign(size_t(width_) * size_t(height_) + 1, 0);
+    for (const Added& added : added_) ++end[added.pixel + 1];
+    std::partial_sum(end.begin(), end.end(), end.begin());
+    sorted_.resize(added_.size());
+    for (const Added& added : added_) sorted_[end[added.pixel]++] = added;
+    added_.clear();
+    const auto key = [](const Added& a) {
+        return std::tuple(a.c.depth, a.cell, a.c.at.x, a.c.at.y, a.c.faces_eye, a.c.alpha,
                           a.c.radiance.x, a.c.radiance.y, a.c.radiance.z);
     };
-    std::sort(order_.begin(), order_.end(),
-              [&](uint32_t a, uint32_t b) { return key(a) < key(b); });
-    for (size_t n = 0; n < order_.size(); ++n) {
-        const Added& added = added_[order_[n]];
-        bin(added);
-        if (n + 1 == order_.size() || added_[order_[n + 1]].pixel != added.pixel)
-            limit(bins_[added.pixel]);
+    uint32_t begin = 0;
+    for (size_t pixel = 0; pixel + 1 < end.size(); ++pixel) {
+        std::sort(sorted_.begin() + begin, sorted_.begin() + end[pixel],
+                  [&](const Added& a, const Added& b) {
+                      return a.c.depth != b.c.depth ? a.c.depth < b.c.depth : key(a) < key(b);
+                  });
+        for (; begin < end[pixel]; ++begin) bin(sorted_[begin]);
+        limit(bins_[pixel]);
     }
-    added_.clear();
 }
 
 void LayerBins::bin(const Added& added) {

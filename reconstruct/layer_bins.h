@@ -84,8 +84,8 @@ private:
     const float focal_;
     int x0_ = 0, y0_ = 0, width_ = 0, height_ = 0;  // pixels
     int picture_width_, picture_height_;
-    std::vector<Added> added_;
-    std::vector<uint32_t> order_;         // of added_
+    std::vector<Added> added_, sorted_;
+    std::vector<uint32_t> pixel_end_;     // in sorted_
     std::vector<std::vector<Bin>> bins_;  // by pixel
     std::vector<float> farthest_;         // by pixel, of what is opaque there and around
 };

@@ -8,6 +8,7 @@
 #include <array>
 
 #include "../unit/uv_grid_samples.h"
+#include "test_scene.h"
 
 namespace stipple {
 namespace {
@@ -263,8 +264,7 @@ TEST(Grids, nothingShinesThroughAFoldedSheet) {
     const DMat3 lean = turned(radians(50.0), 0.4);
     build(front, {{sheet, {lean, DVec3(0.0)}}});
     build(both, {{sheet, {lean, DVec3(0.0)}}, {behind, {lean, DVec3(6.0, -4.0, -25.0)}}});
-    for (const Reconstruct r :
-         {Reconstruct::kPerPixel, Reconstruct::kGaussian, Reconstruct::kEwa}) {
+    for (const Reconstruct r : kReconstructions) {
         for (const bool all_as_points : {false, true}) {
             // Per-pixel leaves single subpixels open where points alone draw what is steep.
             if (all_as_points && r == Reconstruct::kPerPixel) continue;
@@ -342,9 +342,7 @@ TEST(Grids, nestedInstancesWithShadowsAreWhatRaysSee) {
     r.aovs = {"depth", "coverage"};
     const Image rays = castRays(scene, r);
     ThreadPool pool(2);
-    for (const Reconstruct reconstruct :
-         {Reconstruct::kPerPixel, Reconstruct::kSplat, Reconstruct::kGaussian,
-          Reconstruct::kPullPush, Reconstruct::kEwa, Reconstruct::kBins}) {
+    for (const Reconstruct reconstruct : kReconstructions) {
         r.settings.reconstruct = reconstruct;
         const CompareResult result = compareImages(render(scene, r), rays, pool);
         EXPECT_GE(result.psnr, 26.0) << settingValue(r.settings, "reconstruct");
