@@ -164,7 +164,7 @@ float LevelDepths::coverage(int x, int y, float depth) const {
             (1.0f - tx) * corner(l, cx, cy, depth) + tx * corner(l, cx + 1, cy, depth);
         const float bottom =
             (1.0f - tx) * corner(l, cx, cy + 1, depth) + tx * corner(l, cx + 1, cy + 1, depth);
-        sum += std::clamp(2.0f * ((1.0f - ty) * top + ty * bottom) - 0.5f, 0.0f, 1.0f);
+        sum += (1.0f - ty) * top + ty * bottom;
     }
     return std::min(sum, 1.0f);
 }
