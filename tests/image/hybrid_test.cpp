@@ -9,6 +9,7 @@
 #include <scenegraph/io/load.h>
 #include <scenegraph/procedural/generators.h>
 #include <scenegraph/scene_editor.h>
+#include <tests/image/model_views.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -44,29 +45,6 @@ Scene modelOf(const Scene& source, const HybridOptions& options, ThreadPool& poo
     Scene scene;
     const ChildRef child = addHybridModel(scene, parseHybridFile(text, budget, "model"), "model");
     return showing(std::move(scene), child, pool);
-}
-
-// From a direction, the bounds' diagonal `size` pixels long.
-Camera cameraTo(const Scene& scene, const Vec3& from, double size, int pixels) {
-    const DBox3 bounds = sceneBounds(scene);
-    const DVec3 center = 0.5 * (bounds.min + bounds.max);
-    const double diagonal = glm::length(bounds.max - bounds.min);
-    Camera camera = lookAt(center + DVec3(from) * diagonal * 3.0, center);
-    camera.fov_y = 2.0 * std::atan(0.5 * pixels / size / 3.0);
-    return camera;
-}
-
-Image draw(const Scene& scene, const Camera& camera, int pixels, Method method, int rays,
-           ThreadPool& pool, int subpixels = 2, Reconstruct reconstruct = Reconstruct::kPerPixel) {
-    FrameRequest r;
-    r.camera = camera;
-    r.settings.width = r.settings.height = pixels;
-    r.settings.subpixels = subpixels;
-    r.settings.method = method;
-    r.settings.reconstruct = reconstruct;
-    r.settings.samples = rays;
-    r.aovs = {"depth", "coverage"};
-    return Renderer(scene, pool).render(r).image;
 }
 
 GeneratedMesh torus() { return makePrimitive("torus", 20000, Vec3(0.8f, 0.5f, 0.3f)); }

@@ -7,6 +7,7 @@
 #include <render/renderer.h>
 #include <scenegraph/io/surfel_file.h>
 #include <scenegraph/procedural/generators.h>
+#include <tests/image/model_views.h>
 
 #include <filesystem>
 
@@ -73,19 +74,6 @@ Camera cameraTo(const Scene& scene, const Vec3& from, int resolution, int pixels
     return camera;
 }
 
-Image draw(const Scene& scene, const Camera& camera, int pixels, Method method, int rays,
-           ThreadPool& pool, Reconstruct reconstruct = Reconstruct::kPerPixel) {
-    FrameRequest r;
-    r.camera = camera;
-    r.settings.width = r.settings.height = pixels;
-    r.settings.subpixels = 1;
-    r.settings.method = method;
-    r.settings.reconstruct = reconstruct;
-    r.settings.samples = rays;
-    r.aovs = {"depth", "coverage"};
-    return Renderer(scene, pool).render(r).image;
-}
-
 // Views from every step-th direction.
 void expectLikeRays(GeneratedMesh made, int pixels, int step, double least_db, double most_holes) {
     ThreadPool pool(2);
@@ -93,9 +81,9 @@ void expectLikeRays(GeneratedMesh made, int pixels, int step, double least_db, d
     double worst = 1e9, holes = 0.0;
     for (int d = 0; d < kMaskDirections; d += step) {
         const Camera camera = cameraTo(pair.source, maskDirectionOf(d), pixels, pixels, 1.0);
-        const Image one = draw(pair.source, camera, pixels, Method::kRaycast, 1, pool),
-                    many = draw(pair.source, camera, pixels, Method::kRaycast, 16, pool),
-                    points = draw(pair.model, camera, pixels, Method::kPoints, 1, pool);
+        const Image one = draw(pair.source, camera, pixels, Method::kRaycast, 1, pool, 1),
+                    many = draw(pair.source, camera, pixels, Method::kRaycast, 16, pool, 1),
+                    points = draw(pair.model, camera, pixels, Method::kPoints, 1, pool, 1);
         worst = std::min(worst, compareImages(points, one, pool).psnr);
         holes += double(compareImages(points, many, pool).holes->count);
     }
@@ -114,16 +102,16 @@ TEST(PointBlocks, noTearsWhenMagnifiedAndAtTheEdgesOfAWideView) {
           Reconstruct::kBins}) {
         for (int d = 0; d < kMaskDirections; d += 31) {
             const Camera camera = cameraTo(pair.source, maskDirectionOf(d), 64, 256, 4.0);
-            const Image rays = draw(pair.source, camera, 256, Method::kRaycast, 9, pool),
-                        points = draw(pair.model, camera, 256, Method::kPoints, 1, pool, method);
+            const Image rays = draw(pair.source, camera, 256, Method::kRaycast, 9, pool, 1),
+                        points = draw(pair.model, camera, 256, Method::kPoints, 1, pool, 1, method);
             EXPECT_LE(compareImages(points, rays, pool).holes->count, 20u) << int(method);
         }
     }
     // Close before it, 90 degrees wide.
     Camera camera = lookAt(DVec3(0.0, 1.0, 0.4), DVec3(0.0));
     camera.fov_y = kPi / 2.0;
-    const Image rays = draw(pair.source, camera, 256, Method::kRaycast, 9, pool),
-                points = draw(pair.model, camera, 256, Method::kPoints, 1, pool);
+    const Image rays = draw(pair.source, camera, 256, Method::kRaycast, 9, pool, 1),
+                points = draw(pair.model, camera, 256, Method::kPoints, 1, pool, 1);
     EXPECT_LE(compareImages(points, rays, pool).holes->count, 20u);
 }
 
@@ -133,8 +121,8 @@ TEST(PointBlocks, sameBitsForAnyThreadsBuiltAndDrawn) {
     EXPECT_EQ(surfelFileText(*a.model.meshes[0].surfels),
               surfelFileText(*b.model.meshes[0].surfels));
     const Camera camera = cameraTo(a.source, maskDirectionOf(3), 48, 100, 1.5);
-    const Image x = draw(a.model, camera, 100, Method::kPoints, 1, one),
-                y = draw(b.model, camera, 100, Method::kPoints, 1, three);
+    const Image x = draw(a.model, camera, 100, Method::kPoints, 1, one, 1),
+                y = draw(b.model, camera, 100, Method::kPoints, 1, three, 1);
     EXPECT_EQ(x.data, y.data);
 }
 

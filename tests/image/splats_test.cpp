@@ -6,6 +6,7 @@
 #include <scenegraph/io/load.h>
 #include <scenegraph/io/splats.h>
 #include <scenegraph/io/surfel_file.h>
+#include <tests/image/model_views.h>
 #include <tests/image/test_scene.h>
 
 #include <unistd.h>
@@ -40,29 +41,6 @@ Scene modelOf(const Scene& source, const SplatOptions& options, ThreadPool& pool
     return scene;
 }
 
-// From a direction, the bounds' diagonal `size` pixels long.
-Camera cameraTo(const Scene& scene, const Vec3& from, double size, int pixels) {
-    const DBox3 bounds = sceneBounds(scene);
-    const DVec3 center = 0.5 * (bounds.min + bounds.max);
-    const double diagonal = glm::length(bounds.max - bounds.min);
-    Camera camera = lookAt(center + DVec3(from) * diagonal * 3.0, center);
-    camera.fov_y = 2.0 * std::atan(0.5 * pixels / size / 3.0);
-    return camera;
-}
-
-Image draw(const Scene& scene, const Camera& camera, int pixels, Method method, int rays,
-           ThreadPool& pool, Reconstruct reconstruct = Reconstruct::kPerPixel) {
-    FrameRequest r;
-    r.camera = camera;
-    r.settings.width = r.settings.height = pixels;
-    r.settings.subpixels = 2;
-    r.settings.method = method;
-    r.settings.reconstruct = reconstruct;
-    r.settings.samples = rays;
-    r.aovs = {"depth", "coverage"};
-    return Renderer(scene, pool).render(r).image;
-}
-
 struct Seen {
     size_t holes = 0;
     double worst = 1e9, mean = 0.0;  // dB
@@ -78,7 +56,7 @@ Seen lookAround(const Scene& source, const Scene& model, int views, ThreadPool& 
         const Camera camera =
             cameraTo(source, maskDirectionOf(i * 37 % kMaskDirections), 60.0 + 1.4 * n, 128);
         const auto result =
-            compareImages(draw(model, camera, 128, Method::kPoints, 1, pool, reconstruct),
+            compareImages(draw(model, camera, 128, Method::kPoints, 1, pool, 2, reconstruct),
                           draw(source, camera, 128, Method::kRaycast, 16, pool), pool);
         seen.holes += result.holes->count;
         if (result.psnr < seen.worst) seen.worst = result.psnr, seen.worst_view = i;
@@ -151,12 +129,7 @@ TEST(Splats, nothingReachesBeyondABox) {
             ASSERT_GE(n, 3);
             for (int c = 0; c < n; ++c) {
                 const Vec3 p = glm::abs(s.position + corners[size_t(c)]);
-                EXPECT_LE(std::max({p.x, p.y, p.z}), 0.5f + slack)
-                    << i << ": " << s.n_cuts << " cuts, center " << s.position.x << " "
-                    << s.position.y << " " << s.position.z << ", normal " << s.normal.x << " "
-                    << s.normal.y << " " << s.normal.z << ", corner " << p.x << " " << p.y << " "
-                    << p.z << ", ratio " << s.ratio << " long "
-                    << level.spacing * s.radius_share / std::sqrt(s.ratio) / 1.44f;
+                EXPECT_LE(std::max({p.x, p.y, p.z}), 0.5f + slack) << "splat " << i;
             }
         }
     }
@@ -174,8 +147,9 @@ TEST(Splats, everyReconstructionShowsEllipses) {
     }
 }
 
-// A scan from 100 directions: no hole, alike, and fewer ellipses than circles.
-TEST(Splats, aScanIsClosedFromEverywhere) {
+// A scan from 100 directions: no hole, alike in the mean, and fewer ellipses than circles. The
+// worst views, near and above, show flat facets: they are not alike yet, and must not become worse.
+TEST(Splats, aScanIsClosedFromAbove) {
     const char* folder = std::getenv("STIPPLE_TEST_DATA");
     if (!folder || !*folder) GTEST_SKIP() << "no test data (STIPPLE_TEST_DATA)";
     const std::filesystem::path mesh = std::filesystem::path(folder) / "meshes/bunny/bunny.glb",
@@ -196,7 +170,8 @@ TEST(Splats, aScanIsClosedFromEverywhere) {
         // Not from below, where the scan has holes of its own that flat splats close.
         const Seen seen = lookAround(source, model, 100, pool, reconstruct, -0.2f);
         EXPECT_EQ(seen.holes, 0u) << int(reconstruct);
-        EXPECT_GE(seen.mean, 28.0)
+        EXPECT_GE(seen.mean, 28.0) << int(reconstruct);
+        EXPECT_GE(seen.worst, 23.5)
             << int(reconstruct) << ", worst " << seen.worst << " in view " << seen.worst_view;
     }
 }
