@@ -95,6 +95,8 @@ public:
     static constexpr size_t kFewUses = 16;
 
 private:
+    static constexpr uint32_t kGone = 0xffffffffu;  // in place of a slot or a name
+
     // What editing must know of a group beside its octree.
     struct OpenGroup {
         std::vector<uint32_t> parent;                    // of each node
