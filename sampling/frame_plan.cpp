@@ -129,7 +129,8 @@ private:
                 }
             } else {
                 if (!mayBeLarge(node.max_triangle_area, box.bound * area_scale)) continue;
-                const NodeClass node_class = classifyNode(mesh, node, box, area_scale, settings_);
+                const NodeClass node_class =
+                    classifyNode(mesh, node, box, area_scale, 1.0, settings_);
                 if (node_class == NodeClass::kLargeTriangles) addRange(range_begin, node);
                 if (node_class != NodeClass::kOpen) continue;
             }

@@ -30,10 +30,11 @@ inline constexpr float kTileShare = 0.0833f;
 // settings.area_threshold on; in foliage points are cheaper for longer.
 inline constexpr double kSurfaceThreshold = 0.25;
 
-// area_scale: largest area scale of the instance. Depends on nothing but the node and the view, so
-// planning and drawing agree.
+// area_scale: largest area scale of the instance. facing: the largest |cos beta| below the node;
+// says only how many points there would be. Depends on nothing but the node and the view, so
+// planning and drawing agree on triangles.
 inline NodeClass classifyNode(const Mesh& mesh, const MeshNode& node, const BoxProjection& box,
-                              double area_scale, const RenderSettings& settings) {
+                              double area_scale, double facing, const RenderSettings& settings) {
     const bool is_leaf = node.child_count == 0;
     const bool is_mixed = node.stratum == kMixedStratum;
     const double bound = box.bound * area_scale;
@@ -43,7 +44,7 @@ inline NodeClass classifyNode(const Mesh& mesh, const MeshNode& node, const BoxP
                                       double(mesh.strata[node.stratum].patch_width),
                                   bound) > double(kSurfaceWidth * kSurfaceWidth);
     if (largest <= settings.area_threshold * (may_be_surface ? kSurfaceThreshold : 1.0)) {
-        const double n = settings.samples * bound * node.area;
+        const double n = settings.samples * bound * facing * node.area;
         const bool fits =
             box.size <= kTileShare * float(settings.tile_size) && n <= settings.list_length;
         const bool is_uniform = box.depth_ratio <= settings.cut_ratio;

@@ -162,7 +162,7 @@ void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& c
     }
     SeenMesh seen;
     if (node_index == 0 && box.depth_ratio <= context_.settings.cut_ratio) {
-        const RunDensity density = meshDensity(frame, box);
+        const RunDensity density = meshDensity(frame, box, 1.0);
         seen = seeMesh(context_, frame, mesh_index, density);
         const double count = density.drawn * mesh.area;
         if (seen.hasVisible() && box.size <= float(context_.settings.visible_size) &&
@@ -197,10 +197,11 @@ void TileCut::drawPatches(const Mesh& mesh, const Affine& camera_from_object, ui
     opened_.resize(begin);
 }
 
-RunDensity TileCut::meshDensity(const InstanceFrame& frame, const BoxProjection& box) const {
+RunDensity TileCut::meshDensity(const InstanceFrame& frame, const BoxProjection& box,
+                                double facing) const {
     RunDensity density;
     density.wanted = context_.settings.samples;
-    density.drawn = density.wanted * box.bound * frame.area_scale;
+    density.drawn = density.wanted * box.bound * frame.area_scale * facing;
     return density;
 }
 
@@ -212,9 +213,15 @@ void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, cons
     const RenderSettings& settings = context_.settings;
     const Mesh& mesh = context_.scene.meshes[mesh_index];
     const MeshNode& node = mesh.nodes[node_index];
-    switch (classifyNode(mesh, node, box, frame.area_scale, settings)) {
+    const bool orthographic = context_.view.orthographic;
+    const double facing =
+        settings.orientation
+            ? double(largestCosine(node.normals, node.bounds,
+                                   orthographic ? frame.facing : frame.eye_object, orthographic))
+            : 1.0;
+    switch (classifyNode(mesh, node, box, frame.area_scale, facing, settings)) {
         case NodeClass::kPoints: {
-            const RunDensity density = meshDensity(frame, box);
+            const RunDensity density = meshDensity(frame, box, facing);
             addMeshPoints(context_, points_, frame, mesh_index, node_index, seen, density,
                           std::min(density.drawn * node.area, 1e9));
             return;

@@ -39,7 +39,9 @@ private:
     void drawPatches(const Mesh& mesh, const Affine& camera_from_object, uint64_t path);
     void drawMeshNode(const InstanceFrame& frame, uint32_t mesh, const SeenMesh& seen,
                       uint32_t node, const BoxProjection& box, uint32_t& triangle_frame);
-    RunDensity meshDensity(const InstanceFrame& frame, const BoxProjection& box) const;
+    // facing: the largest |cos beta| of what is drawn.
+    RunDensity meshDensity(const InstanceFrame& frame, const BoxProjection& box,
+                           double facing) const;
     void collect(const Affine& camera_from_child, const Box3& bounds, uint32_t index,
                  bool is_instance);
     void sortCollected(size_t begin);

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <core/math.h>
+#include <scenegraph/normal_cone.h>
 #include <scenegraph/surfel_model.h>
 
 #include <cstdint>
@@ -31,7 +32,8 @@ inline constexpr int kMaxStrata = 15;
 // the roots of the strata (when there are several), so every node but the root is homogeneous in
 // area class, patch size and sidedness.
 struct MeshNode {
-    Box3 bounds;        // object space
+    Box3 bounds;  // object space
+    NormalCone normals;
     double area = 0.0;  // of its triangles, m^2
     float max_triangle_area = 0.0f;
     uint32_t first_triangle =

@@ -54,10 +54,13 @@ void checkArrays(const Mesh& mesh, size_t n_materials, const std::string& where)
     }
 }
 
-double triangleArea(const Mesh& mesh, const UVec3& t) {
+// Its length is the triangle's area.
+DVec3 areaVector(const Mesh& mesh, const UVec3& t) {
     const DVec3 a(mesh.positions[t.x]), b(mesh.positions[t.y]), c(mesh.positions[t.z]);
-    return 0.5 * glm::length(glm::cross(b - a, c - a));
+    return 0.5 * glm::cross(b - a, c - a);
 }
+
+double triangleArea(const Mesh& mesh, const UVec3& t) { return glm::length(areaVector(mesh, t)); }
 
 struct DisjointSets {
     std::vector<uint32_t> parent;
@@ -229,11 +232,14 @@ private:
         node.first_child = first_child;
         node.child_count = count;
         node.stratum = stratum;
+        cones_.clear();
         for (uint32_t c = first_child; c < first_child + count; ++c) {
+            cones_.push_back({mesh_.nodes[c].normals, mesh_.nodes[c].area});
             node.bounds.extend(mesh_.nodes[c].bounds);
             node.max_triangle_area =
                 std::max(node.max_triangle_area, mesh_.nodes[c].max_triangle_area);
         }
+        node.normals = surroundingCone(cones_);
         node.area = mesh_.cumulative_area[end] - mesh_.cumulative_area[begin];
         mesh_.nodes[index] = node;
     }
@@ -246,13 +252,17 @@ private:
             node.first_triangle = begin;
             node.triangle_count = end - begin;
             node.stratum = stratum;
+            cones_.clear();
             for (uint32_t t = begin; t < end; ++t) {
                 const UVec3& v = mesh_.triangles[t];
                 for (int k = 0; k < 3; ++k) node.bounds.extend(mesh_.positions[v[k]]);
                 // Not from the cumulated sums, in which small triangles beside large ones vanish.
-                node.max_triangle_area =
-                    std::max(node.max_triangle_area, float(triangleArea(mesh_, v)));
+                const DVec3 n = areaVector(mesh_, v);
+                const double area = glm::length(n);
+                node.max_triangle_area = std::max(node.max_triangle_area, float(area));
+                cones_.push_back({{Vec3(n / area), 1.0f}, area});
             }
+            node.normals = surroundingCone(cones_);
             node.area = mesh_.cumulative_area[end] - mesh_.cumulative_area[begin];
             mesh_.nodes[index] = node;
             return;
@@ -276,6 +286,7 @@ private:
 
     Mesh& mesh_;
     const std::vector<uint64_t>& codes_;
+    std::vector<WeightedCone> cones_;
 };
 
 }  // namespace

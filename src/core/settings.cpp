@@ -150,6 +150,11 @@ std::vector<Entry> makeEntries() {
                "meshes no larger than this are drawn by what can be seen of them from the eye's "
                "direction; larger is faster and less exact, 0 never does",
                kOnlySet),
+        onOff(
+            "orientation", &S::orientation,
+            "draw points on parts of meshes whose triangles face alike for how much they face the "
+            "eye",
+            kOnlySet),
         onOff("culling", &S::culling, "skip batches behind what a tile has already drawn",
               kOnlySet),
         number("splat_world", &S::splat_world, 0.0, 1e6, "metres",

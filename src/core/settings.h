@@ -52,6 +52,7 @@ struct RenderSettings {
     int tile_size = 384;     // subpixels along a side of a screen tile (rounded to whole pixels)
     double visible_size = 32.0;  // meshes no larger than this many subpixels are drawn by what can
                                  // be seen of them from the eye's direction
+    bool orientation = false;    // fewer points on parts of meshes that face the eye sideways
     bool culling = true;         // skip batches behind what a tile has already drawn
     bool fill = true;            // per-pixel: occlusion removal and filling
 };

@@ -172,6 +172,26 @@ TEST(SamplingUniform, pixelsOfAnOrthographicView) {
     expectUniformOverPixels(camera, sheared(), Affine());
 }
 
+// What faces the eye sideways is drawn with fewer points, and as many are kept.
+TEST(SamplingUniform, orientationSavesPointsAndKeepsAsMany) {
+    for (const Affine& inner : {Affine(), sheared()}) {
+        const Scene scene = planeScene(inner, Affine(), 1);
+        const Camera camera = lookAt({0.2, 0.9, 4.0}, {0, 0, 0});
+        RenderSettings settings = randomSettings(20.0);
+        const Drawn without = draw(scene, camera, settings, 320, 240);
+        settings.orientation = true;
+        const Drawn with = draw(scene, camera, settings, 320, 240);
+        const double n = double(without.collector.points.size());
+        ASSERT_GT(n, 10000.0);
+        EXPECT_NEAR(double(with.collector.points.size()), n, 4.0 * std::sqrt(2.0 * n));
+        EXPECT_GT(double(without.collector.drawn), 1.6 * double(with.collector.drawn));
+        // Where lengths are scaled alike the bound is tight; else it holds for any direction.
+        if (inner.linear == DMat3(1.0)) {
+            EXPECT_LT(double(with.collector.drawn), 1.25 * n);
+        }
+    }
+}
+
 // Far away a whole group is sampled at once: its instances must get points by their projected
 // areas.
 TEST(SamplingUniform, instancesOfAFarGroup) {
