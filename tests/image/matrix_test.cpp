@@ -148,7 +148,7 @@ std::string nameOf(const FrameRequest& r) {
 }
 
 TEST_F(Matrix, eachSourceAloneLooksLikeRays) {
-    ThreadPool pool(2);
+    ThreadPool one(1), pool(2), seven(7);
     for (int i = 0; i < kSourceCount; ++i) {
         const Scene drawn = scene(i, i + 1, false, pool), original = scene(i, i + 1, true, pool);
         for (const bool orthographic : {false, true}) {
@@ -156,8 +156,11 @@ TEST_F(Matrix, eachSourceAloneLooksLikeRays) {
             const Image reference = rays(original, r, pool);
             for (const Reconstruct reconstruct : kReconstructions) {
                 r.settings.reconstruct = reconstruct;
-                expectLikeRays(Renderer(drawn, pool).render(r).image, reference,
-                               std::string(kSources[i].name) + ", " + nameOf(r), pool);
+                const std::string what = std::string(kSources[i].name) + ", " + nameOf(r);
+                const Image picture = Renderer(drawn, pool).render(r).image;
+                expectLikeRays(picture, reference, what, pool);
+                for (ThreadPool* other : {&one, &seven})
+                    EXPECT_EQ(Renderer(drawn, *other).render(r).image.data, picture.data) << what;
             }
         }
     }
