@@ -27,8 +27,9 @@ double studentT99(int freedom) {
 std::string keyOf(const StudyRow& row) {
     std::string key;
     for (const auto& [column, value] : row) {
-        static const std::set<std::string> kOwn = {"id",      "repetition", "seed",    "scene",
-                                                   "version", "machine",    "finished"};
+        static const std::set<std::string> kOwn = {"id",      "repetition",   "seed",
+                                                   "scene",   "scene_hash",   "version",
+                                                   "machine", "others_share", "finished"};
         if (!isMeasured(column) && !kOwn.count(column)) key += column + " " + value + "\n";
     }
     return key;

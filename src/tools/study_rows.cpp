@@ -45,11 +45,12 @@ constexpr Measured kMeasured[] = {
 };
 
 std::vector<std::string> makeColumns() {
-    std::vector<std::string> columns = {"id",   "sweep",      "camera", "nest",
-                                        "zoom", "repetition", "scene",  "measure"};
+    std::vector<std::string> columns = {
+        "id",   "sweep", "measure",    "camera",     "nest",         "nest_grid",
+        "zoom", "scene", "scene_hash", "repetition", "later_frames", "reference_rays"};
     for (const SettingInfo& info : settingsTable()) columns.push_back(info.key);
     for (const Measured& m : kMeasured) columns.push_back(m.column);
-    for (const char* by : {"version", "machine", "finished"}) columns.push_back(by);
+    for (const char* by : {"version", "machine", "others_share", "finished"}) columns.push_back(by);
     return columns;
 }
 

@@ -8,6 +8,7 @@
 #include <scenegraph/io/load.h>
 #include <tools/bench.h>
 #include <tools/bench_reference.h>
+#include <tools/processor_time.h>
 #include <tools/signals.h>
 #include <tools/study_scene.h>
 
@@ -127,6 +128,7 @@ public:
     }
 
     void run(RowFile& file) {
+        for (const StudyCase& one : study_.cases) scene_.checkCamera(one, study_.path);
         const size_t n = study_.cases.size() * size_t(study_.repetitions);
         size_t done = 0;
         // Repetitions outermost: what drifts on the machine reaches all cases alike.
@@ -138,8 +140,10 @@ public:
                 options_.progress("measure", double(done) / double(n));
                 StudyRow row = describe(one, repetition);
                 row["id"] = id;
+                const ProcessorTime before = processorTime();
                 measure(one, repetition, repetition == 0 && pictured_.count(int(c)) > 0, row);
                 throwIfCancelled(*options_.cancel);
+                row["others_share"] = numberText(othersShare(before, processorTime()));
                 row["finished"] = timeText();
                 file.add(row);
             }
@@ -155,7 +159,11 @@ private:
         row["nest"] = std::to_string(one.nest);
         row["zoom"] = numberText(one.zoom);
         row["repetition"] = std::to_string(repetition);
+        row["nest_grid"] = std::to_string(study_.nest_grid);
         row["scene"] = study_.scene_path;
+        row["scene_hash"] = hexText(study_.scene_fingerprint);
+        row["later_frames"] = std::to_string(study_.later_frames);
+        row["reference_rays"] = std::to_string(study_.reference_rays);
         for (const SettingInfo& info : settingsTable())
             row[info.key] = settingValue(one.settings, info.key);
         row["seed"] = std::to_string(repetition + 1);

@@ -102,6 +102,10 @@ const Scene& StudyScene::atLevel(int nest) {
     return scene_;
 }
 
+void StudyScene::checkCamera(const StudyCase& one, const std::string& where) const {
+    if (one.camera != kFitCamera) chooseCamera(scene_, one.camera, where);
+}
+
 Camera StudyScene::camera(const StudyCase& one) {
     const Scene& scene = atLevel(one.nest);
     const bool is_fit = one.camera == kFitCamera && !scene.findCamera(kFitCamera);

@@ -17,9 +17,10 @@ public:
     // As many copies of the scene's first mesh in one group, side by side: what edits are timed in.
     // Throws kInvalidArgument for more than 10^7, or a scene whose root shows no mesh.
     Scene inOneGroup(int nest);
-    // The case's camera: of the scene, or kFitCamera, with the case's zoom. Throws
-    // kInvalidArgument for a camera that is not there.
+    // The case's camera: of the scene, or kFitCamera, with the case's zoom.
     Camera camera(const StudyCase& one);
+    // Throws kInvalidArgument for a camera that is not there. where: names the study in errors.
+    void checkCamera(const StudyCase& one, const std::string& where) const;
 
 private:
     void addLevel();

@@ -125,6 +125,7 @@ StudySummary summarizeStudy(const Study& study, const std::vector<StudyRow>& row
     std::map<std::string, const StudyRow*> by_id;
     for (const StudyRow& row : rows) by_id[row.at("id")] = &row;
     std::vector<RowsOfCase> of_case(study.cases.size());
+    RowsOfCase all;
     for (size_t c = 0; c < study.cases.size(); ++c) {
         for (int repetition = 0; repetition < study.repetitions; ++repetition) {
             ++summary.rows_wanted;
@@ -132,10 +133,13 @@ StudySummary summarizeStudy(const Study& study, const std::vector<StudyRow>& row
             if (found == by_id.end()) continue;
             ++summary.rows_there;
             of_case[c].push_back(found->second);
+            all.push_back(found->second);
             summary.version = found->second->at("version");
             summary.machine = found->second->at("machine");
         }
     }
+
+    summary.others_share = summarize(numbersOf(all, "others_share")).value;
 
     for (const StudyPlot& plot : study.plots) {
         StudyLines& lines = summary.lines.emplace_back();

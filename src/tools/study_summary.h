@@ -46,6 +46,7 @@ struct StudySummary {
     std::vector<StudyAnswer> answers;
     size_t rows_wanted = 0, rows_there = 0;
     std::string version, machine;
+    double others_share = 0.0;  // of the processors, that other programs took meanwhile
 };
 
 // rows: all that rows.csv holds; those of other studies are left out.
