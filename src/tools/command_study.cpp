@@ -75,6 +75,12 @@ void studyPointBlocks(BlockStudyOptions options, bool quiet, const std::string& 
 }
 
 void printAnswers(const StudySummary& summary) {
+    if (summary.rows_disturbed > 0) {
+        std::printf(
+            "other programs took more than a tenth of the processors during %zu of %zu rows: their "
+            "times are too long (rows.csv: others_share)\n",
+            summary.rows_disturbed, summary.rows_there);
+    }
     for (const StudyAnswer& a : summary.answers) {
         std::printf("%s (%.2f dB, %.3f s): ", a.reference.c_str(), a.psnr, a.seconds);
         if (a.best.empty()) {

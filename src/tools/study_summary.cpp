@@ -125,7 +125,6 @@ StudySummary summarizeStudy(const Study& study, const std::vector<StudyRow>& row
     std::map<std::string, const StudyRow*> by_id;
     for (const StudyRow& row : rows) by_id[row.at("id")] = &row;
     std::vector<RowsOfCase> of_case(study.cases.size());
-    RowsOfCase all;
     for (size_t c = 0; c < study.cases.size(); ++c) {
         for (int repetition = 0; repetition < study.repetitions; ++repetition) {
             ++summary.rows_wanted;
@@ -133,13 +132,12 @@ StudySummary summarizeStudy(const Study& study, const std::vector<StudyRow>& row
             if (found == by_id.end()) continue;
             ++summary.rows_there;
             of_case[c].push_back(found->second);
-            all.push_back(found->second);
+            for (const double share : numbersOf({found->second}, "others_share"))
+                summary.rows_disturbed += share > kDisturbedShare;
             summary.version = found->second->at("version");
             summary.machine = found->second->at("machine");
         }
     }
-
-    summary.others_share = summarize(numbersOf(all, "others_share")).value;
 
     for (const StudyPlot& plot : study.plots) {
         StudyLines& lines = summary.lines.emplace_back();

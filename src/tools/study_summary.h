@@ -46,8 +46,10 @@ struct StudySummary {
     std::vector<StudyAnswer> answers;
     size_t rows_wanted = 0, rows_there = 0;
     std::string version, machine;
-    double others_share = 0.0;  // of the processors, that other programs took meanwhile
+    size_t rows_disturbed = 0;  // times are too long, as other programs took more than
+                                // kDisturbedShare of the processors meanwhile
 };
+inline constexpr double kDisturbedShare = 0.1;
 
 // rows: all that rows.csv holds; those of other studies are left out.
 StudySummary summarizeStudy(const Study& study, const std::vector<StudyRow>& rows);
