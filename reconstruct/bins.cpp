@@ -161,19 +161,49 @@ private:
             const auto isSeen = [&](int x, int y, float depth) {
                 return !isBehindFront(x, y, depth);
             };
-            triangle.visit(bounds, isSeen, [&](int x, int y, float depth) {
-                const Vec2 middle(float(x) + 0.5f, float(y) + 0.5f);
+            const auto cover = [&](int x, int y, float depth) {
                 // Triangles are exact, nothing is closed beyond them. Most texels of a leaf's
                 // picture show nothing, and where it is opaque the first pass has drawn it.
-                const float alpha = block.mask ? block.mask->alpha(i, middle.x, middle.y) : 1.0f;
-                if (!(alpha > 0.0f) || (block.mask && alpha >= kOpaqueAlpha)) return;
-                Vec3 origin, direction;
-                view.ray(middle.x, middle.y, origin, direction);
-                lookUp(origin + direction * depth, block.first_number + uint32_t(i), middle, c);
-                c.depth = depth;
-                layers_.add(x, y, c);
+                const float alpha =
+                    block.mask ? block.mask->alpha(i, float(x) + 0.5f, float(y) + 0.5f) : 1.0f;
+                if (alpha > 0.0f && (!block.mask || alpha < kOpaqueAlpha))
+                    covered_.push_back({x, y, depth, alpha});
+            };
+            triangle.visit(bounds, shader_.sharedSide(), isSeen, cover, [&] {
+                if (!covered_.empty())
+                    addCovered(triangle.plane(), block.first_number + uint32_t(i), c);
+                covered_.clear();
             });
         }
+    }
+
+    // Subpixels of one triangle, which are shaded together if they may be.
+    void addCovered(const PicturePlane& plane, uint32_t number, Contribution& c) {
+        const bool is_shared = covered_.size() > 1 && showMiddle(plane, number);
+        for (const Covered& at : covered_) {
+            if (!is_shared) {
+                const Vec2 middle(float(at.x) + 0.5f, float(at.y) + 0.5f);
+                shader_.showPoint(*lookup_, positionAt(middle, at.depth), number, middle);
+            }
+            c.depth = at.depth;
+            c.alpha = at.alpha;
+            c.radiance = shader_.radiance();
+            layers_.add(at.x, at.y, c);
+        }
+    }
+    bool showMiddle(const PicturePlane& plane, uint32_t number) {
+        Vec2 middle(0.0f);
+        for (const Covered& at : covered_) middle += Vec2(float(at.x) + 0.5f, float(at.y) + 0.5f);
+        middle /= float(covered_.size());
+        const float q = plane.qAt(middle);
+        return shader_.showShared(*lookup_,
+                                  positionAt(middle, context_.view.orthographic ? q : 1.0f / q),
+                                  number, middle, float(covered_.size()));
+    }
+    Vec3 positionAt(const Vec2& p_sub, float depth) const {
+        Vec3 origin, direction;
+        context_.view.ray(p_sub.x, p_sub.y, origin, direction);
+        return origin + direction * depth;
     }
 
     const ReconstructionContext context_;
@@ -188,6 +218,11 @@ private:
     SubpixelRect inner_;
     SubpixelRect binned_;  // whole pixels
     SubpixelRect wanted_;  // by the second pass
+    struct Covered {
+        int x, y;
+        float depth, alpha;
+    };
+    std::vector<Covered> covered_;  // by the triangle at hand, of a square
     int pass_ = 0;
     const SampleLookup* lookup_ = nullptr;
 };

@@ -61,18 +61,27 @@ public:
                 bound(std::nextafter(x_hi, 1e30f) + 1e-3f, rect.x0, rect.x1),
                 bound(std::nextafter(y_hi, 1e30f) + 1e-3f, rect.y0, rect.y1)};
     }
-    // Calls visit(x, y, depth) for the centres within, of bounds(), for which wants(x, y, depth).
-    template <class Wants, class Visit>
-    void visit(const SubpixelRect& bounds, const Wants& wants, const Visit& visit) const {
+    // Calls visit(x, y, depth) for the centres within, of bounds(), for which wants(x, y, depth),
+    // and next() after those of each square of `side` subpixels.
+    template <class Wants, class Visit, class Next>
+    void visit(const SubpixelRect& bounds, int side, const Wants& wants, const Visit& visit,
+               const Next& next) const {
         const Edge edges[] = {
             {at_[0], at_[1], at_[2]}, {at_[1], at_[2], at_[0]}, {at_[2], at_[0], at_[1]}};
-        for (int y = bounds.y0; y < bounds.y1; ++y) {
-            for (int x = bounds.x0; x < bounds.x1; ++x) {
-                const Vec2 p(float(x) + 0.5f, float(y) + 0.5f);
-                const float q = plane_.qAt(p), depth = orthographic_ ? q : 1.0f / q;
-                if (q > 0.0f && wants(x, y, depth) && edges[0].holds(p) && edges[1].holds(p) &&
-                    edges[2].holds(p))
-                    visit(x, y, depth);
+        for (int top = bounds.y0; top < bounds.y1; top += side - top % side) {
+            const int bottom = std::min(bounds.y1, top + side - top % side);
+            for (int left = bounds.x0; left < bounds.x1; left += side - left % side) {
+                const int right = std::min(bounds.x1, left + side - left % side);
+                for (int y = top; y < bottom; ++y) {
+                    for (int x = left; x < right; ++x) {
+                        const Vec2 p(float(x) + 0.5f, float(y) + 0.5f);
+                        const float q = plane_.qAt(p), depth = orthographic_ ? q : 1.0f / q;
+                        if (q > 0.0f && wants(x, y, depth) && edges[0].holds(p) &&
+                            edges[1].holds(p) && edges[2].holds(p))
+                            visit(x, y, depth);
+                    }
+                }
+                next();
             }
         }
     }

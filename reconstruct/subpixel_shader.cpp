@@ -35,7 +35,7 @@ bool SubpixelShader::hasVariedLight() const {
 }
 
 uint32_t SubpixelShader::membersBeside(const Cell& cell, uint32_t members) const {
-    const int side = std::min(kSharedCells, context_.view.subpixels) / 2;
+    const int side = sharedSide();
     const int first = std::countr_zero(members);
     if (side < 2) return uint32_t(1) << first;
     uint32_t beside = 0;
@@ -66,12 +66,17 @@ bool SubpixelShader::showMembers(const SampleLookup& lookup, const Cell& cell, u
     const float depth = orthographic ? q / n : n / q;
     Vec3 origin, direction;
     context_.view.ray(at.x, at.y, origin, direction);
-    sample_.extent = std::sqrt(n);
-    showPoint(lookup, origin + direction * depth, cell.number[first], at);
-    sample_.extent = 1.0f;
-    if ((*context_.materials)[sample_.material].normal_map.texture == kNoTexture) return true;
+    if (showShared(lookup, origin + direction * depth, cell.number[first], at, n)) return true;
     varied_number_ = cell.number[first];
     return false;
+}
+
+bool SubpixelShader::showShared(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
+                                const Vec2& p_sub, float count) {
+    sample_.extent = std::sqrt(count);
+    showPoint(lookup, p_camera, number, p_sub);
+    sample_.extent = 1.0f;
+    return (*context_.materials)[sample_.material].normal_map.texture == kNoTexture;
 }
 
 void SubpixelShader::showPoint(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,

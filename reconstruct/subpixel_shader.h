@@ -26,6 +26,14 @@ public:
     template <class Take>
     void showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
                    const Take& take);
+    // Side of the squares of subpixels within which one look-up may do for all.
+    int sharedSide() const {
+        const int side = std::min(kSharedCells, context_.view.subpixels);
+        return hasVariedLight() ? std::max(side / 2, 1) : side;
+    }
+    // Surface and radiance for so many subpixels around p_sub. False where the normal varies.
+    bool showShared(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
+                    const Vec2& p_sub, float count);
     // Surface and radiance of a point, whose position is known.
     void showPoint(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
                    const Vec2& p_sub);
