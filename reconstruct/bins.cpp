@@ -76,7 +76,7 @@ public:
     }
     bool take(const TriangleBlock& block) override {
         if (pass_ == 1 && block.blended) addTriangles(block);
-        return means_.take(block);
+        return !block.is_clear && means_.take(block);
     }
 
     void endTile(const SampleLookup& lookup) override {

@@ -101,12 +101,17 @@ void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t tria
         block.count = int(std::min<uint32_t>(kBlockPoints, node.triangle_count - first));
         block.first_number = context_.nextNumber() | kTriangleBit;
         block.blended = 0;
+        block.is_clear = stratum.blended && context_.sink->wantsLayers();
         for (int i = 0; i < block.count; ++i) {
             const UVec3& t = mesh.triangles[node.first_triangle + first + uint32_t(i)];
             for (int k = 0; k < 3; ++k) {
                 const Vec3 p = linear * mesh.positions[t[k]] + translation;
                 block.x[k][i] = p.x, block.y[k][i] = p.y, block.z[k][i] = p.z;
             }
+            // Textures and vertices' colours make it no more opaque.
+            const uint16_t material =
+                mesh.triangle_material[node.first_triangle + first + uint32_t(i)];
+            block.is_clear &= context_.scene.materials[material].alpha < kOpaqueAlpha;
         }
         if (stratum.blended && context_.sink->wantsLayers()) {
             // A stratum's triangles are all blended.

@@ -139,6 +139,7 @@ struct TriangleBlock {
     uint32_t first_number = 0;
     const MaskTest* mask = nullptr;  // nullptr: all surface
     uint64_t blended = 0;            // for sinks that want layers: bit i, triangle i is blended
+    bool is_clear = false;           // for these: all are blended, and none is opaque anywhere
     bool is_wide = false;            // on a patch at least kSurfaceWidth wide
     alignas(64) float x[3][kBlockPoints];  // of the three vertices
     alignas(64) float y[3][kBlockPoints];
