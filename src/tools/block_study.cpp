@@ -8,6 +8,7 @@
 #include <render/renderer.h>
 #include <scenegraph/io/load.h>
 #include <scenegraph/io/surfel_file.h>
+#include <tools/block_study_views.h>
 
 #include <algorithm>
 #include <cmath>
@@ -24,7 +25,6 @@ constexpr int kViews = 4;       // of a model, evenly among the mask directions
 constexpr int kCullViews = 26;  // of a model, for shares of blocks
 constexpr int kFrames = kBlockStudyFrames;
 constexpr double kEyeDistance = 4.0;  // from the middle, in radii
-constexpr double kSteps = 36.0;       // of an asset, for progress
 
 // How models are built, by what the thesis calls it.
 struct Variant {
@@ -45,26 +45,33 @@ std::vector<Variant> sizeVariants() {
         }
     };
     add("tolerance angle", "tolerance_angle", {"0", "15", "25", "35", "45"}, true, {});
-    add("tolerance angle, squares", "tolerance_angle", {"0", "15", "25", "35", "45"}, true,
+    add("tolerance angle, squares", "tolerance_angle", {"25", "35", "45", "55"}, true,
         {{"lattice", "squares"}});
-    add("block size", "block_size", {"4", "8", "16", "32"}, true, {});
-    add("tolerance angle", "tolerance_angle", {"0", "15", "35", "45"}, false, {});
-    add("tolerance angle, squares", "tolerance_angle", {"25", "45"}, false,
-        {{"lattice", "squares"}});
+    add("block size", "block_size", {"4", "16", "32"}, true, {});
+    add("tolerance angle", "tolerance_angle", {"15", "35"}, false, {});
+    add("tolerance angle, squares", "tolerance_angle", {"45"}, false, {{"lattice", "squares"}});
     add("block size", "block_size", {"4", "16"}, false, {});
     return variants;
 }
 
+// A view of the source by rays.
+struct Seen {
+    Camera camera;
+    Image one, many;  // one centred ray a pixel; 16
+};
+
 struct Asset {
     std::string name;
     Scene source;
+    std::vector<Seen> views;  // kViews
 };
 
 // A model and a scene that shows it.
 struct Built {
     SurfelModel model;
     PointBlockReport report;
-    size_t bytes = 0;  // of the file
+    size_t bytes = 0;             // of the file
+    double bits_per_point = 0.0;  // of all levels
     Scene scene;
 };
 
@@ -96,12 +103,16 @@ public:
             measure(asset);
             ++assets_done_;
         }
-        addMeans(sizes_);
-        addMeans(visibility_);
-        addMeans(screen_);
-        addMeans(projections_);
-        return {models_, phases_,      culling_, sizes_,  visibility_,
-                screen_, projections_, quality_, shadows_};
+        std::vector<StudyTable> tables;
+        for (StudyTable* table : {&models_, &views_, &phases_, &culling_, &sizes_, &visibility_,
+                                  &screen_, &projections_, &quality_, &shadows_}) {
+            if (!isWanted(table->name)) continue;
+            if (table == &sizes_ || table == &visibility_ || table == &screen_ ||
+                table == &projections_)
+                addMeans(*table);
+            tables.push_back(std::move(*table));
+        }
+        return tables;
     }
 
 private:
@@ -109,10 +120,15 @@ private:
         if (options_.cancel && options_.cancel->requested)
             throw Error(ErrorCode::kCancelled, "", "cancelled");
         if (options_.progress) {
-            options_.progress("measure", (double(assets_done_) + double(steps_done_) / kSteps) /
-                                             double(options_.assets.size()));
+            options_.progress("measure",
+                              (double(assets_done_) + double(steps_done_) / double(steps_)) /
+                                  double(options_.assets.size()));
         }
         ++steps_done_;
+    }
+    bool isWanted(const std::string& table) const {
+        const std::vector<std::string>& wanted = options_.tables;
+        return wanted.empty() || std::find(wanted.begin(), wanted.end(), table) != wanted.end();
     }
 
     Built build(const Asset& asset, const std::vector<std::pair<std::string, std::string>>& set,
@@ -133,6 +149,9 @@ private:
     void show(const Asset& asset, Built& built, const std::string& name) {
         const std::string text = surfelFileText(built.model);
         built.bytes = text.size();
+        size_t points = 0;
+        for (const SurfelLevel& level : built.model.levels) points += level.size();
+        built.bits_per_point = 8.0 * double(built.bytes) / double(points);
         const std::string path =
             (fs::path(options_.folder) / "models" / (name + ".stipple")).string();
         saveFile(path, text);
@@ -141,13 +160,13 @@ private:
     }
 
     // At unit magnification: a pixel at the near side is as large as one of the model.
-    Camera camera(const Asset& asset, int view, int views, double zoom = 1.0) const {
+    Camera camera(const Asset& asset, int view, int views) const {
         const DBox3 bounds = sceneBounds(asset.source);
         const DVec3 center = 0.5 * (bounds.min + bounds.max);
         const double radius = 0.5 * glm::length(bounds.max - bounds.min);
         const Vec3 from = maskDirectionOf((view * kMaskDirections + 37) / views % kMaskDirections);
         Camera camera = lookAt(center + DVec3(from) * radius * kEyeDistance, center);
-        const double pixel = 2.0 * radius / options_.resolution / zoom;
+        const double pixel = 2.0 * radius / options_.resolution;
         camera.fov_y =
             2.0 * std::atan(0.5 * options_.resolution * pixel / ((kEyeDistance - 1.0) * radius));
         camera.near_z = 0.01 * radius;
@@ -203,59 +222,97 @@ private:
     struct Drawn {
         double ms = 0.0, psnr = 0.0, holes = 0.0;  // means; holes: the sum
     };
-    Drawn drawViews(const Asset& asset, const Scene& scene, const RenderSettings& settings,
-                    double zoom = 1.0) {
+    Drawn drawViews(const Asset& asset, const Scene& scene) {
         Drawn drawn;
-        for (int v = 0; v < kViews; ++v) {
-            const Camera eye = camera(asset, v, kViews, zoom);
-            const Timed timed = draw(scene, eye, settings);
+        for (const Seen& seen : asset.views) {
+            const Timed timed = draw(scene, seen.camera, settings());
             drawn.ms += timed.seconds * 1e3 / kViews;
-            drawn.psnr +=
-                compareImages(timed.image, rays(asset.source, eye, 1), pool_).psnr / kViews;
-            drawn.holes +=
-                double(compareImages(timed.image, rays(asset.source, eye, 16), pool_).holes->count);
+            drawn.psnr += compareImages(timed.image, seen.one, pool_).psnr / kViews;
+            drawn.holes += double(compareImages(timed.image, seen.many, pool_).holes->count);
         }
         return drawn;
     }
 
+    // What fills one or two tables, in so many steps of progress.
+    struct Part {
+        std::string table, other_table;
+        int steps;
+        void (BlockStudy::*measure)(const Asset&, const Built&);
+    };
+
     void measure(Asset& asset) {
+        const Part parts[] = {
+            {"models", "", 1, &BlockStudy::measureModel},
+            {"views", "", 228, &BlockStudy::measureViews},
+            {"phases", "", 1, &BlockStudy::measurePhases},
+            {"culling", "screen", 1, &BlockStudy::measureCulling},
+            {"visibility", "", 6, &BlockStudy::measureVisibility},
+            {"quality", "", 1, &BlockStudy::measureQuality},
+            {"shadows", "", 1, &BlockStudy::measureShadows},
+            {"projections", "", 3, &BlockStudy::measureProjections},
+            {"sizes", "", int(sizeVariants().size()), &BlockStudy::measureSizes},
+        };
+        const auto isPartWanted = [&](const Part& part) {
+            return isWanted(part.table) ||
+                   (!part.other_table.empty() && isWanted(part.other_table));
+        };
         steps_done_ = 0;
+        steps_ = 1;
+        for (const Part& part : parts) steps_ += isPartWanted(part) ? size_t(part.steps) : 0;
         progress();
         const Built built = build(asset, {}, asset.name);
-        measureModel(asset, built);
-        measurePhases(asset, built);
-        measureCulling(asset, built);
-        measureVisibility(asset, built);
-        measureQuality(asset, built);
-        measureShadows(asset, built);
-        measureProjections(asset, built);
-        measureSizes(asset, built);
+        for (int v = 0; v < kViews; ++v) {
+            const Camera eye = camera(asset, v, kViews);
+            asset.views.push_back({eye, rays(asset.source, eye, 1), rays(asset.source, eye, 16)});
+        }
+        for (const Part& part : parts) {
+            if (isPartWanted(part)) (this->*part.measure)(asset, built);
+        }
     }
 
     void measureModel(const Asset& asset, const Built& built) {
         progress();
-        const Drawn drawn = drawViews(asset, built.scene, settings());
+        const Drawn drawn = drawViews(asset, built.scene);
         const SurfelLevel& level = built.model.levels[0];
-        models_.rows.push_back(
-            {{asset.name},
-             {double(built.bytes) / 1e6, double(level.blocks.size()), double(level.size()),
-              built.report.per_pixel, built.report.seconds, drawn.ms, drawn.psnr, drawn.holes}});
-        const Camera eye = camera(asset, 0, kViews);
+        models_.rows.push_back({{asset.name},
+                                {double(built.bytes) / 1e6, double(level.blocks.size()),
+                                 double(level.size()), built.bits_per_point, built.report.per_pixel,
+                                 built.report.seconds, drawn.ms, drawn.psnr, drawn.holes}});
         const auto path = [&](const char* kind) {
             return (fs::path(options_.folder) / "pictures" / (asset.name + kind)).string();
         };
-        saveImage(draw(built.scene, eye, settings(), 1).image, path(".points.png"));
-        saveImage(rays(asset.source, eye, 1), path(".rays.png"));
+        saveImage(draw(built.scene, asset.views[0].camera, settings(), 1).image,
+                  path(".points.png"));
+        saveImage(asset.views[0].one, path(".rays.png"));
+    }
+
+    void measureViews(const Asset& asset, const Built& built) {
+        const std::pair<BlockViews, const char*> kinds[] = {
+            {BlockViews::kUnit, "unit magnification"},
+            {BlockViews::kMagnified, "magnified 4 times"},
+            {BlockViews::kWide, "90 degrees wide"}};
+        for (const auto& [kind, name] : kinds) {
+            const BlockViewsResult result =
+                measureBlockViews(asset.source, built.scene, built.model, kind, options_.resolution,
+                                  pool_, options_.cancel, [&] { progress(); });
+            views_.rows.push_back(
+                {{asset.name, name},
+                 {double(result.views), result.holes, double(result.views_with_holes),
+                  result.most_holes, result.mean_psnr, result.worst_psnr}});
+        }
     }
 
     void measurePhases(const Asset& asset, const Built& built) {
         progress();
         RenderSettings s = settings();
         std::vector<double> sums(7, 0.0);
+        double warped = 0.0, warp_seconds = 0.0;
         for (int v = 0; v < kViews; ++v) {
             const Camera eye = camera(asset, v, kViews);
             const WarpSeconds warp = measureWarp(built.scene, built.model, built.model.levels[0],
                                                  viewOf(eye), s, kFrames);
+            warped += double(warp.points);
+            warp_seconds += warp.warp - warp.visibility;
             const Timed whole = draw(built.scene, eye, s);
             RenderSettings unfilled = s;
             unfilled.fill = false;
@@ -269,6 +326,7 @@ private:
                                        filled.seconds};
             for (size_t i = 0; i < 7; ++i) sums[i] += seconds[i] * 1e3 / kViews;
         }
+        sums.push_back(warped * 1e-6 / warp_seconds);
         phases_.rows.push_back({{asset.name}, sums});
     }
 
@@ -328,9 +386,8 @@ private:
     void addQuality(const Asset& asset, const Scene& scene, const std::string& drawn,
                     const std::string& how, RenderSettings s) {
         s.reconstruct = Reconstruct::kPullPush;
-        const Camera eye = camera(asset, 0, kViews);
-        const Timed timed = draw(scene, eye, s, 4);
-        const CompareResult result = compareImages(timed.image, rays(asset.source, eye, 16), pool_);
+        const Timed timed = draw(scene, asset.views[0].camera, s, 4);
+        const CompareResult result = compareImages(timed.image, asset.views[0].many, pool_);
         quality_.rows.push_back(
             {{asset.name, drawn, how},
              {result.psnr, result.flip, double(result.holes->count), timed.seconds * 1e3}});
@@ -378,7 +435,7 @@ private:
             Built other;
             if (!is_default) other = build(asset, {{"directions", directions}}, "variant");
             const Built& b = is_default ? built : other;
-            const Drawn drawn = drawViews(asset, b.scene, settings());
+            const Drawn drawn = drawViews(asset, b.scene);
             projections_.rows.push_back(
                 {{asset.name, directions},
                  {double(b.model.levels[0].size()), double(b.model.levels[0].blocks.size()),
@@ -408,7 +465,11 @@ private:
         for (const Variant& variant : sizeVariants()) {
             progress();
             const Built b = build(asset, variant.set, "variant");
-            add(variant.what, variant.value, b, drawSeconds(b.scene));
+            const double seconds = drawSeconds(b.scene);
+            add(variant.what, variant.value, b, seconds);
+            // The same model by its block size.
+            if (variant.what == "tolerance angle, as the thesis" && variant.value == "25")
+                add("block size, as the thesis", "8", b, seconds);
         }
         fs::remove(fs::path(options_.folder) / "models" / "variant.stipple");
     }
@@ -441,27 +502,40 @@ private:
     Diagnostics& diagnostics_;
     ThreadPool pool_, one_thread_{1};
     const CancelFlag never_;
-    size_t assets_done_ = 0, steps_done_ = 0;
+    size_t assets_done_ = 0, steps_done_ = 0, steps_ = 1;
 
-    StudyTable models_ = {
-        "models",
-        "Models (thesis: table 8.1)",
-        "Size of the file, blocks and points of the finest level, points a pixel "
-        "of the surface at unit magnification, building; frames at unit "
-        "magnification, against one centred ray; holes of all views against 16.",
-        {"model"},
-        {"MB", "blocks", "points", "points_per_pixel", "build_s", "frame_ms", "psnr_db", "holes"},
-        {}};
-    StudyTable phases_ = {"phases",
-                          "Milliseconds by phase (thesis: table 8.2)",
-                          "One thread. Visibility: cones and masks of all blocks. Warp: points to "
-                          "camera space. Depth: into the z-buffer, what is hidden left out (below "
-                          "0 where that saves warping). Gaps: found and filled. Shade: looked up, "
-                          "shaded, written. Last, the whole frame by pull and push.",
+    StudyTable models_ = {"models",
+                          "Models (thesis: table 8.1)",
+                          "Size of the file, blocks and points of the finest level, bits a point "
+                          "of all levels, points a pixel "
+                          "of the surface at unit magnification, building; frames at unit "
+                          "magnification, against one centred ray; holes of all views against 16.",
                           {"model"},
-                          {"visibility_ms", "warp_ms", "depth_ms", "gaps_ms", "shade_ms",
-                           "total_ms", "pull_push_total_ms"},
+                          {"MB", "blocks", "points", "bits_per_point", "points_per_pixel",
+                           "build_s", "frame_ms", "psnr_db", "holes"},
                           {}};
+    StudyTable views_ = {
+        "views",
+        "Random views",
+        "From random directions, one subpixel a pixel: pixels that are holes, against 16 rays, of "
+        "all views; views that have any; the most of one view; quality against one centred ray. "
+        "At unit magnification; about random points of the surface; with the model at the edge of "
+        "a wide picture.",
+        {"model", "view"},
+        {"views", "holes", "views_with_holes", "most_holes", "mean_psnr_db", "worst_psnr_db"},
+        {}};
+    StudyTable phases_ = {
+        "phases",
+        "Milliseconds by phase (thesis: table 8.2)",
+        "One thread. Visibility: cones and masks of all blocks. Warp: points to "
+        "camera space. Depth: into the z-buffer, what is hidden left out (below "
+        "0 where that saves warping). Gaps: found and filled. Shade: looked up, "
+        "shaded, written. Then the whole frame by pull and push. Last, million points "
+        "of the blocks that are not culled by seconds of warp.",
+        {"model"},
+        {"visibility_ms", "warp_ms", "depth_ms", "gaps_ms", "shade_ms", "total_ms",
+         "pull_push_total_ms", "warp_million_points_s"},
+        {}};
     StudyTable culling_ = {"culling",
                            "Per cent of blocks culled (thesis: table 8.3)",
                            "Means of views from everywhere.",

@@ -14,10 +14,15 @@ namespace stipple {
 
 inline constexpr int kBlockStudyFrames = 12;  // of a view; the fastest counts
 
+inline constexpr const char* kBlockStudyTables[] = {
+    "models",     "views",  "phases",      "culling", "sizes",
+    "visibility", "screen", "projections", "quality", "shadows"};
+
 struct BlockStudyOptions {
     std::vector<std::string> assets;  // files of scenes and models
     std::string folder;               // exists; models/ and pictures/ come here
     int resolution = 256;             // of models, and pixels along a side of pictures
+    std::vector<std::string> tables;  // kBlockStudyTables; none: all
     bool allow_outside = false;
     const CancelFlag* cancel = nullptr;
     std::function<void(const std::string& phase, double fraction)> progress;

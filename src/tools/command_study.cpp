@@ -120,6 +120,13 @@ ExitCode runStudyCommand(const std::vector<std::string>& arguments) {
         ->type_name("N")
         ->check(CLI::Range(16, 1024).description(""))
         ->group("Point blocks");
+    app.add_option("--tables", blocks.tables, "measure these alone, separated by commas")
+        ->type_name("NAME...")
+        ->delimiter(',')
+        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kBlockStudyTables),
+                                                       std::end(kBlockStudyTables)))
+                    .description(""))
+        ->group("Point blocks");
     app.add_flag("--allow-outside", options.allow_outside, "let the scene's paths leave its folder")
         ->group("Running");
     app.add_flag("-q,--quiet", quiet, "no progress, only warnings and errors")->group("Running");
@@ -140,8 +147,10 @@ ExitCode runStudyCommand(const std::vector<std::string>& arguments) {
         studyPointBlocks(blocks, quiet, json);
         return ExitCode::kDone;
     }
-    if (app.count("--resolution"))
-        throw Error(ErrorCode::kInvalidArgument, "--resolution", "needs --point-blocks");
+    for (const char* option : {"--resolution", "--tables"}) {
+        if (app.count(option))
+            throw Error(ErrorCode::kInvalidArgument, option, "needs --point-blocks");
+    }
     if (input.empty()) throw Error(ErrorCode::kInvalidArgument, "", "STUDY is required");
     if (options.folder.empty()) throw Error(ErrorCode::kInvalidArgument, "--output", "is required");
 
