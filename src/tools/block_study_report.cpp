@@ -109,7 +109,8 @@ std::string blockStudyJson(const std::vector<StudyTable>& tables,
         names += (names.empty() ? "" : ", ") + nameOf(asset);
         pictures.push_back({{"id", nameOf(asset) + ".points"},
                             {"reference", nameOf(asset) + ".rays"},
-                            {"label", nameOf(asset)}});
+                            {"reference_label", nameOf(asset) + ", one ray a pixel"},
+                            {"label", nameOf(asset) + ", points"}});
     }
     return Json{{"schema", 1},
                 {"title", "Point-block models"},
