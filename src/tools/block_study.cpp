@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <set>
 
 namespace stipple {
@@ -183,28 +184,44 @@ private:
         return makeView(camera, options_.resolution, options_.resolution, 1);
     }
 
-    Timed draw(const Scene& scene, const Camera& camera, const RenderSettings& settings,
-               int frames = kFrames) {
-        Renderer renderer(scene, one_thread_);
+    struct Shown {
+        const Scene* scene;
+        RenderSettings settings;
+    };
+    // The fastest of so many frames of each. They take turns, so what else the machine does
+    // slows all alike.
+    std::vector<Timed> drawInTurns(const std::vector<Shown>& shown, const Camera& camera,
+                                   int frames = kFrames) {
+        std::vector<std::unique_ptr<Renderer>> renderers;
+        for (const Shown& one : shown)
+            renderers.push_back(std::make_unique<Renderer>(*one.scene, one_thread_));
         FrameRequest request;
         request.camera = camera;
-        request.settings = settings;
         request.cancel = options_.cancel;
-        Timed timed;
+        std::vector<Timed> result(shown.size());
         for (int f = 0; f < frames; ++f) {
-            const Frame frame = renderer.render(request);
-            if (frame.stats.seconds < timed.seconds) {
-                timed.seconds = frame.stats.seconds;
+            for (size_t i = 0; i < shown.size(); ++i) {
+                request.settings = shown[i].settings;
+                const Frame frame = renderers[i]->render(request);
+                Timed& timed = result[i];
+                timed.seconds = std::min(timed.seconds, frame.stats.seconds);
                 for (const auto& [phase, seconds] : frame.stats.phases) {
-                    if (phase == "draw") timed.draw = seconds;
-                    if (phase == "reconstruct") timed.finish = seconds;
+                    if (phase == "draw") timed.draw = std::min(timed.draw, seconds);
+                    if (phase == "reconstruct") timed.finish = std::min(timed.finish, seconds);
                 }
             }
         }
         // The picture with what comparing asks for.
         request.aovs = {"depth", "coverage"};
-        timed.image = renderer.render(request).image;
-        return timed;
+        for (size_t i = 0; i < shown.size(); ++i) {
+            request.settings = shown[i].settings;
+            result[i].image = renderers[i]->render(request).image;
+        }
+        return result;
+    }
+    Timed draw(const Scene& scene, const Camera& camera, const RenderSettings& settings,
+               int frames = kFrames) {
+        return std::move(drawInTurns({{&scene, settings}}, camera, frames)[0]);
     }
 
     Image rays(const Scene& scene, const Camera& camera, int rays) {
@@ -313,13 +330,12 @@ private:
                                                  viewOf(eye), s, kFrames);
             warped += double(warp.points);
             warp_seconds += warp.warp - warp.visibility;
-            const Timed whole = draw(built.scene, eye, s);
-            RenderSettings unfilled = s;
+            RenderSettings unfilled = s, pull_push = s;
             unfilled.fill = false;
-            const Timed without_fill = draw(built.scene, eye, unfilled);
-            RenderSettings pull_push = s;
             pull_push.reconstruct = Reconstruct::kPullPush;
-            const Timed filled = draw(built.scene, eye, pull_push);
+            const std::vector<Timed> timed = drawInTurns(
+                {{&built.scene, s}, {&built.scene, unfilled}, {&built.scene, pull_push}}, eye);
+            const Timed &whole = timed[0], &without_fill = timed[1], &filled = timed[2];
             const double seconds[7] = {warp.visibility,        warp.warp - warp.visibility,
                                        whole.draw - warp.warp, whole.finish - without_fill.finish,
                                        without_fill.finish,    whole.seconds,
@@ -351,36 +367,44 @@ private:
     }
 
     void measureVisibility(const Asset& asset, const Built& built) {
+        std::vector<Built> limited;
+        std::vector<std::string> names;
         for (const bool cones : {false, true}) {
             for (const int directions : {0, 32, 128}) {
                 progress();
-                Built limited;
-                limited.model = built.model;
-                limitVisibility(limited.model, cones, directions);
-                show(asset, limited, asset.name + "-limited");
-                double culled = 0.0, ms = 0.0, warp_ms = 0.0;
-                for (int v = 0; v < kCullViews; ++v) {
-                    culled += culledShares(limited.model, limited.model.levels[0],
-                                           viewOf(camera(asset, v, kCullViews)))
-                                  .both *
-                              100.0 / kCullViews;
-                }
-                for (int v = 0; v < kViews; ++v) {
-                    const Camera eye = camera(asset, v, kViews);
-                    ms += draw(limited.scene, eye, settings()).seconds * 1e3 / kViews;
-                    warp_ms += measureWarp(limited.scene, limited.model, limited.model.levels[0],
-                                           viewOf(eye), settings(), kFrames)
-                                   .warp *
-                               1e3 / kViews;
-                }
-                visibility_.rows.push_back(
-                    {{asset.name,
-                      std::string(cones ? "cones" : "no cones") + ", " +
-                          (directions ? std::to_string(directions) + " directions" : "no masks")},
-                     {culled, warp_ms, ms}});
+                limited.emplace_back().model = built.model;
+                limitVisibility(limited.back().model, cones, directions);
+                show(asset, limited.back(), asset.name + "-limited");
+                names.push_back(
+                    std::string(cones ? "cones" : "no cones") + ", " +
+                    (directions ? std::to_string(directions) + " directions" : "no masks"));
             }
         }
         fs::remove(fs::path(options_.folder) / "models" / (asset.name + "-limited.stipple"));
+        std::vector<Shown> shown;
+        for (const Built& b : limited) shown.push_back({&b.scene, settings()});
+        std::vector<double> ms(limited.size(), 0.0), warp_ms = ms;
+        for (const Seen& seen : asset.views) {
+            const std::vector<Timed> timed = drawInTurns(shown, seen.camera);
+            for (size_t i = 0; i < limited.size(); ++i) {
+                ms[i] += timed[i].seconds * 1e3 / kViews;
+                warp_ms[i] +=
+                    measureWarp(limited[i].scene, limited[i].model, limited[i].model.levels[0],
+                                viewOf(seen.camera), settings(), kFrames)
+                        .warp *
+                    1e3 / kViews;
+            }
+        }
+        for (size_t i = 0; i < limited.size(); ++i) {
+            double culled = 0.0;
+            for (int v = 0; v < kCullViews; ++v) {
+                culled += culledShares(limited[i].model, limited[i].model.levels[0],
+                                       viewOf(camera(asset, v, kCullViews)))
+                              .both *
+                          100.0 / kCullViews;
+            }
+            visibility_.rows.push_back({{asset.name, names[i]}, {culled, warp_ms[i], ms[i]}});
+        }
     }
 
     void addQuality(const Asset& asset, const Scene& scene, const std::string& drawn,
@@ -419,10 +443,11 @@ private:
         lit.lighting.suns.clear();
         for (int n = 1; n <= 3; ++n) {
             lit.lighting.suns.push_back({glm::normalize(directions[n - 1]), Vec3(2.0f / float(n))});
-            RenderSettings s = settings();
-            const double without = draw(lit, camera(asset, 0, kViews), s).seconds * 1e3;
-            s.shadows = true;
-            const double with = draw(lit, camera(asset, 0, kViews), s).seconds * 1e3;
+            RenderSettings shadows = settings();
+            shadows.shadows = true;
+            const std::vector<Timed> timed =
+                drawInTurns({{&lit, settings()}, {&lit, shadows}}, asset.views[0].camera);
+            const double without = timed[0].seconds * 1e3, with = timed[1].seconds * 1e3;
             shadows_.rows.push_back({{asset.name, std::to_string(n)},
                                      {without, with, (with - without) / n / without * 100.0}});
         }
@@ -445,31 +470,29 @@ private:
 
     // Sizes and times relative to the model as it is built by default.
     void measureSizes(const Asset& asset, const Built& built) {
-        const auto drawSeconds = [&](const Scene& scene) {
-            double seconds = 0.0;
-            for (int v = 0; v < kViews; ++v)
-                seconds += draw(scene, camera(asset, v, kViews), settings()).seconds / kViews;
-            return seconds;
-        };
-        const double default_seconds = drawSeconds(built.scene);
         const auto add = [&](const std::string& what, const std::string& value, const Built& b,
-                             double seconds) {
+                             double time, double draw_time) {
             sizes_.rows.push_back(
                 {{asset.name, what, value},
                  {double(b.model.levels[0].size()), double(b.model.levels[0].blocks.size()),
-                  double(b.bytes) / double(built.bytes), seconds / default_seconds,
-                  b.report.seconds}});
+                  double(b.bytes) / double(built.bytes), time, draw_time, b.report.seconds}});
         };
         for (const char* what : {"tolerance angle", "block size"})
-            add(what, std::string(what) == "block size" ? "8" : "25", built, default_seconds);
+            add(what, std::string(what) == "block size" ? "8" : "25", built, 1.0, 1.0);
         for (const Variant& variant : sizeVariants()) {
             progress();
             const Built b = build(asset, variant.set, "variant");
-            const double seconds = drawSeconds(b.scene);
-            add(variant.what, variant.value, b, seconds);
+            double time = 0.0, draw_time = 0.0;
+            for (const Seen& seen : asset.views) {
+                const std::vector<Timed> timed =
+                    drawInTurns({{&b.scene, settings()}, {&built.scene, settings()}}, seen.camera);
+                time += timed[0].seconds / timed[1].seconds / kViews;
+                draw_time += timed[0].draw / timed[1].draw / kViews;
+            }
+            add(variant.what, variant.value, b, time, draw_time);
             // The same model by its block size.
             if (variant.what == "tolerance angle, as the thesis" && variant.value == "25")
-                add("block size, as the thesis", "8", b, seconds);
+                add("block size, as the thesis", "8", b, time, draw_time);
         }
         fs::remove(fs::path(options_.folder) / "models" / "variant.stipple");
     }
@@ -504,88 +527,16 @@ private:
     const CancelFlag never_;
     size_t assets_done_ = 0, steps_done_ = 0, steps_ = 1;
 
-    StudyTable models_ = {"models",
-                          "Models (thesis: table 8.1)",
-                          "Size of the file, blocks and points of the finest level, bits a point "
-                          "of all levels, points a pixel "
-                          "of the surface at unit magnification, building; frames at unit "
-                          "magnification, against one centred ray; holes of all views against 16.",
-                          {"model"},
-                          {"MB", "blocks", "points", "bits_per_point", "points_per_pixel",
-                           "build_s", "frame_ms", "psnr_db", "holes"},
-                          {}};
-    StudyTable views_ = {
-        "views",
-        "Random views",
-        "From random directions, one subpixel a pixel: pixels that are holes, against 16 rays, of "
-        "all views; views that have any; the most of one view; quality against one centred ray. "
-        "At unit magnification; about random points of the surface; with the model at the edge of "
-        "a wide picture.",
-        {"model", "view"},
-        {"views", "holes", "views_with_holes", "most_holes", "mean_psnr_db", "worst_psnr_db"},
-        {}};
-    StudyTable phases_ = {
-        "phases",
-        "Milliseconds by phase (thesis: table 8.2)",
-        "One thread. Visibility: cones and masks of all blocks. Warp: points to "
-        "camera space. Depth: into the z-buffer, what is hidden left out (below "
-        "0 where that saves warping). Gaps: found and filled. Shade: looked up, "
-        "shaded, written. Then the whole frame by pull and push. Last, million points "
-        "of the blocks that are not culled by seconds of warp.",
-        {"model"},
-        {"visibility_ms", "warp_ms", "depth_ms", "gaps_ms", "shade_ms", "total_ms",
-         "pull_push_total_ms", "warp_million_points_s"},
-        {}};
-    StudyTable culling_ = {"culling",
-                           "Per cent of blocks culled (thesis: table 8.3)",
-                           "Means of views from everywhere.",
-                           {"model"},
-                           {"neither", "cone", "mask", "both"},
-                           {}};
-    StudyTable sizes_ = {"sizes",
-                         "Size and time over tolerance angle, block size and lattice (thesis: "
-                         "figures 5.5, 5.6, 5.7)",
-                         "Relative to the model as it is built by default. As the thesis: whole "
-                         "blocks, taken as they come; else single samples that others make up for "
-                         "are left out.",
-                         {"model", "what", "value"},
-                         {"points", "blocks", "size", "time", "build_s"},
-                         {}};
-    StudyTable visibility_ = {"visibility",
-                              "Cones and bits of masks (thesis: figure 6.7)",
-                              "Blocks left out, milliseconds of visibility and warp, and of the "
-                              "frame.",
-                              {"model", "tests"},
-                              {"culled_percent", "warp_ms", "frame_ms"},
-                              {}};
-    StudyTable screen_ = {"screen",
-                          "Masks over the screen's subdivision (thesis: figure 6.8)",
-                          "Per cent of blocks culled by masks alone, the screen in 2^n x 2^n parts "
-                          "with a mask each; and with each block's own direction, as drawn here.",
-                          {"model", "n"},
-                          {"culled_percent"},
-                          {}};
-    StudyTable projections_ = {"projections",
-                               "Number of projections (thesis: section 5.1)",
-                               "",
-                               {"model", "projections"},
-                               {"points", "blocks", "build_s", "frame_ms", "psnr_db", "holes"},
-                               {}};
-    StudyTable quality_ = {"quality",
-                           "Coverage, depth threshold and backs with pull and push (thesis: "
-                           "figures 4.9, 7.2, 7.6)",
-                           "Against 16 rays a pixel. Models leave no gaps at unit magnification, "
-                           "so coverage and threshold are shown by points drawn anew on the mesh.",
-                           {"model", "drawn", "how"},
-                           {"psnr_db", "flip", "holes", "frame_ms"},
-                           {}};
-    StudyTable shadows_ = {"shadows",
-                           "What shadows cost (thesis: figure 7.4)",
-                           "Suns; the last column is per cent of the frame without shadows, for "
-                           "each light.",
-                           {"model", "lights"},
-                           {"without_ms", "with_ms", "percent_a_light"},
-                           {}};
+    StudyTable models_ = blockStudyTable("models");
+    StudyTable views_ = blockStudyTable("views");
+    StudyTable phases_ = blockStudyTable("phases");
+    StudyTable culling_ = blockStudyTable("culling");
+    StudyTable sizes_ = blockStudyTable("sizes");
+    StudyTable visibility_ = blockStudyTable("visibility");
+    StudyTable screen_ = blockStudyTable("screen");
+    StudyTable projections_ = blockStudyTable("projections");
+    StudyTable quality_ = blockStudyTable("quality");
+    StudyTable shadows_ = blockStudyTable("shadows");
 };
 
 }  // namespace

@@ -123,9 +123,7 @@ ExitCode runStudyCommand(const std::vector<std::string>& arguments) {
     app.add_option("--tables", blocks.tables, "measure these alone, separated by commas")
         ->type_name("NAME...")
         ->delimiter(',')
-        ->check(CLI::IsMember(std::vector<std::string>(std::begin(kBlockStudyTables),
-                                                       std::end(kBlockStudyTables)))
-                    .description(""))
+        ->check(CLI::IsMember(blockStudyTables()).description(""))
         ->group("Point blocks");
     app.add_flag("--allow-outside", options.allow_outside, "let the scene's paths leave its folder")
         ->group("Running");
