@@ -46,7 +46,7 @@ std::vector<Variant> sizeVariants() {
         }
     };
     add("tolerance angle", "tolerance_angle", {"0", "15", "25", "35", "45"}, true, {});
-    add("tolerance angle, squares", "tolerance_angle", {"25", "35", "45", "55"}, true,
+    add("tolerance angle, squares", "tolerance_angle", {"0", "15", "25", "45"}, true,
         {{"lattice", "squares"}});
     add("block size", "block_size", {"4", "16", "32"}, true, {});
     add("tolerance angle", "tolerance_angle", {"15", "35"}, false, {});
