@@ -8,10 +8,12 @@
 #include <render/renderer.h>
 #include <scenegraph/io/load.h>
 #include <scenegraph/io/surfel_file.h>
+#include <tools/block_study_views.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <memory>
 #include <set>
 
 namespace stipple {
@@ -24,7 +26,6 @@ constexpr int kViews = 4;       // of a model, evenly among the mask directions
 constexpr int kCullViews = 26;  // of a model, for shares of blocks
 constexpr int kFrames = kBlockStudyFrames;
 constexpr double kEyeDistance = 4.0;  // from the middle, in radii
-constexpr double kSteps = 36.0;       // of an asset, for progress
 
 // How models are built, by what the thesis calls it.
 struct Variant {
@@ -45,26 +46,33 @@ std::vector<Variant> sizeVariants() {
         }
     };
     add("tolerance angle", "tolerance_angle", {"0", "15", "25", "35", "45"}, true, {});
-    add("tolerance angle, squares", "tolerance_angle", {"0", "15", "25", "35", "45"}, true,
+    add("tolerance angle, squares", "tolerance_angle", {"0", "15", "25", "45"}, true,
         {{"lattice", "squares"}});
-    add("block size", "block_size", {"4", "8", "16", "32"}, true, {});
-    add("tolerance angle", "tolerance_angle", {"0", "15", "35", "45"}, false, {});
-    add("tolerance angle, squares", "tolerance_angle", {"25", "45"}, false,
-        {{"lattice", "squares"}});
+    add("block size", "block_size", {"4", "16", "32"}, true, {});
+    add("tolerance angle", "tolerance_angle", {"15", "35"}, false, {});
+    add("tolerance angle, squares", "tolerance_angle", {"45"}, false, {{"lattice", "squares"}});
     add("block size", "block_size", {"4", "16"}, false, {});
     return variants;
 }
 
+// A view of the source by rays.
+struct Seen {
+    Camera camera;
+    Image one, many;  // one centred ray a pixel; 16
+};
+
 struct Asset {
     std::string name;
     Scene source;
+    std::vector<Seen> views;  // kViews
 };
 
 // A model and a scene that shows it.
 struct Built {
     SurfelModel model;
     PointBlockReport report;
-    size_t bytes = 0;  // of the file
+    size_t bytes = 0;             // of the file
+    double bits_per_point = 0.0;  // of all levels
     Scene scene;
 };
 
@@ -96,12 +104,16 @@ public:
             measure(asset);
             ++assets_done_;
         }
-        addMeans(sizes_);
-        addMeans(visibility_);
-        addMeans(screen_);
-        addMeans(projections_);
-        return {models_, phases_,      culling_, sizes_,  visibility_,
-                screen_, projections_, quality_, shadows_};
+        std::vector<StudyTable> tables;
+        for (StudyTable* table : {&models_, &views_, &phases_, &culling_, &sizes_, &visibility_,
+                                  &screen_, &projections_, &quality_, &shadows_}) {
+            if (!isWanted(table->name)) continue;
+            if (table == &sizes_ || table == &visibility_ || table == &screen_ ||
+                table == &projections_)
+                addMeans(*table);
+            tables.push_back(std::move(*table));
+        }
+        return tables;
     }
 
 private:
@@ -109,10 +121,15 @@ private:
         if (options_.cancel && options_.cancel->requested)
             throw Error(ErrorCode::kCancelled, "", "cancelled");
         if (options_.progress) {
-            options_.progress("measure", (double(assets_done_) + double(steps_done_) / kSteps) /
-                                             double(options_.assets.size()));
+            options_.progress("measure",
+                              (double(assets_done_) + double(steps_done_) / double(steps_)) /
+                                  double(options_.assets.size()));
         }
         ++steps_done_;
+    }
+    bool isWanted(const std::string& table) const {
+        const std::vector<std::string>& wanted = options_.tables;
+        return wanted.empty() || std::find(wanted.begin(), wanted.end(), table) != wanted.end();
     }
 
     Built build(const Asset& asset, const std::vector<std::pair<std::string, std::string>>& set,
@@ -133,6 +150,9 @@ private:
     void show(const Asset& asset, Built& built, const std::string& name) {
         const std::string text = surfelFileText(built.model);
         built.bytes = text.size();
+        size_t points = 0;
+        for (const SurfelLevel& level : built.model.levels) points += level.size();
+        built.bits_per_point = 8.0 * double(built.bytes) / double(points);
         const std::string path =
             (fs::path(options_.folder) / "models" / (name + ".stipple")).string();
         saveFile(path, text);
@@ -141,13 +161,13 @@ private:
     }
 
     // At unit magnification: a pixel at the near side is as large as one of the model.
-    Camera camera(const Asset& asset, int view, int views, double zoom = 1.0) const {
+    Camera camera(const Asset& asset, int view, int views) const {
         const DBox3 bounds = sceneBounds(asset.source);
         const DVec3 center = 0.5 * (bounds.min + bounds.max);
         const double radius = 0.5 * glm::length(bounds.max - bounds.min);
         const Vec3 from = maskDirectionOf((view * kMaskDirections + 37) / views % kMaskDirections);
         Camera camera = lookAt(center + DVec3(from) * radius * kEyeDistance, center);
-        const double pixel = 2.0 * radius / options_.resolution / zoom;
+        const double pixel = 2.0 * radius / options_.resolution;
         camera.fov_y =
             2.0 * std::atan(0.5 * options_.resolution * pixel / ((kEyeDistance - 1.0) * radius));
         camera.near_z = 0.01 * radius;
@@ -164,28 +184,44 @@ private:
         return makeView(camera, options_.resolution, options_.resolution, 1);
     }
 
-    Timed draw(const Scene& scene, const Camera& camera, const RenderSettings& settings,
-               int frames = kFrames) {
-        Renderer renderer(scene, one_thread_);
+    struct Shown {
+        const Scene* scene;
+        RenderSettings settings;
+    };
+    // The fastest of so many frames of each. They take turns, so what else the machine does
+    // slows all alike.
+    std::vector<Timed> drawInTurns(const std::vector<Shown>& shown, const Camera& camera,
+                                   int frames = kFrames) {
+        std::vector<std::unique_ptr<Renderer>> renderers;
+        for (const Shown& one : shown)
+            renderers.push_back(std::make_unique<Renderer>(*one.scene, one_thread_));
         FrameRequest request;
         request.camera = camera;
-        request.settings = settings;
         request.cancel = options_.cancel;
-        Timed timed;
+        std::vector<Timed> result(shown.size());
         for (int f = 0; f < frames; ++f) {
-            const Frame frame = renderer.render(request);
-            if (frame.stats.seconds < timed.seconds) {
-                timed.seconds = frame.stats.seconds;
+            for (size_t i = 0; i < shown.size(); ++i) {
+                request.settings = shown[i].settings;
+                const Frame frame = renderers[i]->render(request);
+                Timed& timed = result[i];
+                timed.seconds = std::min(timed.seconds, frame.stats.seconds);
                 for (const auto& [phase, seconds] : frame.stats.phases) {
-                    if (phase == "draw") timed.draw = seconds;
-                    if (phase == "reconstruct") timed.finish = seconds;
+                    if (phase == "draw") timed.draw = std::min(timed.draw, seconds);
+                    if (phase == "reconstruct") timed.finish = std::min(timed.finish, seconds);
                 }
             }
         }
         // The picture with what comparing asks for.
         request.aovs = {"depth", "coverage"};
-        timed.image = renderer.render(request).image;
-        return timed;
+        for (size_t i = 0; i < shown.size(); ++i) {
+            request.settings = shown[i].settings;
+            result[i].image = renderers[i]->render(request).image;
+        }
+        return result;
+    }
+    Timed draw(const Scene& scene, const Camera& camera, const RenderSettings& settings,
+               int frames = kFrames) {
+        return std::move(drawInTurns({{&scene, settings}}, camera, frames)[0]);
     }
 
     Image rays(const Scene& scene, const Camera& camera, int rays) {
@@ -203,72 +239,110 @@ private:
     struct Drawn {
         double ms = 0.0, psnr = 0.0, holes = 0.0;  // means; holes: the sum
     };
-    Drawn drawViews(const Asset& asset, const Scene& scene, const RenderSettings& settings,
-                    double zoom = 1.0) {
+    Drawn drawViews(const Asset& asset, const Scene& scene) {
         Drawn drawn;
-        for (int v = 0; v < kViews; ++v) {
-            const Camera eye = camera(asset, v, kViews, zoom);
-            const Timed timed = draw(scene, eye, settings);
+        for (const Seen& seen : asset.views) {
+            const Timed timed = draw(scene, seen.camera, settings());
             drawn.ms += timed.seconds * 1e3 / kViews;
-            drawn.psnr +=
-                compareImages(timed.image, rays(asset.source, eye, 1), pool_).psnr / kViews;
-            drawn.holes +=
-                double(compareImages(timed.image, rays(asset.source, eye, 16), pool_).holes->count);
+            drawn.psnr += compareImages(timed.image, seen.one, pool_).psnr / kViews;
+            drawn.holes += double(compareImages(timed.image, seen.many, pool_).holes->count);
         }
         return drawn;
     }
 
+    // What fills one or two tables, in so many steps of progress.
+    struct Part {
+        std::string table, other_table;
+        int steps;
+        void (BlockStudy::*measure)(const Asset&, const Built&);
+    };
+
     void measure(Asset& asset) {
+        const Part parts[] = {
+            {"models", "", 1, &BlockStudy::measureModel},
+            {"views", "", 228, &BlockStudy::measureViews},
+            {"phases", "", 1, &BlockStudy::measurePhases},
+            {"culling", "screen", 1, &BlockStudy::measureCulling},
+            {"visibility", "", 6, &BlockStudy::measureVisibility},
+            {"quality", "", 1, &BlockStudy::measureQuality},
+            {"shadows", "", 1, &BlockStudy::measureShadows},
+            {"projections", "", 3, &BlockStudy::measureProjections},
+            {"sizes", "", int(sizeVariants().size()), &BlockStudy::measureSizes},
+        };
+        const auto isPartWanted = [&](const Part& part) {
+            return isWanted(part.table) ||
+                   (!part.other_table.empty() && isWanted(part.other_table));
+        };
         steps_done_ = 0;
+        steps_ = 1;
+        for (const Part& part : parts) steps_ += isPartWanted(part) ? size_t(part.steps) : 0;
         progress();
         const Built built = build(asset, {}, asset.name);
-        measureModel(asset, built);
-        measurePhases(asset, built);
-        measureCulling(asset, built);
-        measureVisibility(asset, built);
-        measureQuality(asset, built);
-        measureShadows(asset, built);
-        measureProjections(asset, built);
-        measureSizes(asset, built);
+        for (int v = 0; v < kViews; ++v) {
+            const Camera eye = camera(asset, v, kViews);
+            asset.views.push_back({eye, rays(asset.source, eye, 1), rays(asset.source, eye, 16)});
+        }
+        for (const Part& part : parts) {
+            if (isPartWanted(part)) (this->*part.measure)(asset, built);
+        }
     }
 
     void measureModel(const Asset& asset, const Built& built) {
         progress();
-        const Drawn drawn = drawViews(asset, built.scene, settings());
+        const Drawn drawn = drawViews(asset, built.scene);
         const SurfelLevel& level = built.model.levels[0];
-        models_.rows.push_back(
-            {{asset.name},
-             {double(built.bytes) / 1e6, double(level.blocks.size()), double(level.size()),
-              built.report.per_pixel, built.report.seconds, drawn.ms, drawn.psnr, drawn.holes}});
-        const Camera eye = camera(asset, 0, kViews);
+        models_.rows.push_back({{asset.name},
+                                {double(built.bytes) / 1e6, double(level.blocks.size()),
+                                 double(level.size()), built.bits_per_point, built.report.per_pixel,
+                                 built.report.seconds, drawn.ms, drawn.psnr, drawn.holes}});
         const auto path = [&](const char* kind) {
             return (fs::path(options_.folder) / "pictures" / (asset.name + kind)).string();
         };
-        saveImage(draw(built.scene, eye, settings(), 1).image, path(".points.png"));
-        saveImage(rays(asset.source, eye, 1), path(".rays.png"));
+        saveImage(draw(built.scene, asset.views[0].camera, settings(), 1).image,
+                  path(".points.png"));
+        saveImage(asset.views[0].one, path(".rays.png"));
+    }
+
+    void measureViews(const Asset& asset, const Built& built) {
+        const std::pair<BlockViews, const char*> kinds[] = {
+            {BlockViews::kUnit, "unit magnification"},
+            {BlockViews::kMagnified, "magnified 4 times"},
+            {BlockViews::kWide, "90 degrees wide"}};
+        for (const auto& [kind, name] : kinds) {
+            const BlockViewsResult result =
+                measureBlockViews(asset.source, built.scene, built.model, kind, options_.resolution,
+                                  pool_, options_.cancel, [&] { progress(); });
+            views_.rows.push_back(
+                {{asset.name, name},
+                 {double(result.views), result.holes, double(result.views_with_holes),
+                  result.most_holes, result.mean_psnr, result.worst_psnr}});
+        }
     }
 
     void measurePhases(const Asset& asset, const Built& built) {
         progress();
         RenderSettings s = settings();
         std::vector<double> sums(7, 0.0);
+        double warped = 0.0, warp_seconds = 0.0;
         for (int v = 0; v < kViews; ++v) {
             const Camera eye = camera(asset, v, kViews);
             const WarpSeconds warp = measureWarp(built.scene, built.model, built.model.levels[0],
                                                  viewOf(eye), s, kFrames);
-            const Timed whole = draw(built.scene, eye, s);
-            RenderSettings unfilled = s;
+            warped += double(warp.points);
+            warp_seconds += warp.warp - warp.visibility;
+            RenderSettings unfilled = s, pull_push = s;
             unfilled.fill = false;
-            const Timed without_fill = draw(built.scene, eye, unfilled);
-            RenderSettings pull_push = s;
             pull_push.reconstruct = Reconstruct::kPullPush;
-            const Timed filled = draw(built.scene, eye, pull_push);
+            const std::vector<Timed> timed = drawInTurns(
+                {{&built.scene, s}, {&built.scene, unfilled}, {&built.scene, pull_push}}, eye);
+            const Timed &whole = timed[0], &without_fill = timed[1], &filled = timed[2];
             const double seconds[7] = {warp.visibility,        warp.warp - warp.visibility,
                                        whole.draw - warp.warp, whole.finish - without_fill.finish,
                                        without_fill.finish,    whole.seconds,
                                        filled.seconds};
             for (size_t i = 0; i < 7; ++i) sums[i] += seconds[i] * 1e3 / kViews;
         }
+        sums.push_back(warped * 1e-6 / warp_seconds);
         phases_.rows.push_back({{asset.name}, sums});
     }
 
@@ -293,44 +367,51 @@ private:
     }
 
     void measureVisibility(const Asset& asset, const Built& built) {
+        std::vector<Built> limited;
+        std::vector<std::string> names;
         for (const bool cones : {false, true}) {
             for (const int directions : {0, 32, 128}) {
                 progress();
-                Built limited;
-                limited.model = built.model;
-                limitVisibility(limited.model, cones, directions);
-                show(asset, limited, asset.name + "-limited");
-                double culled = 0.0, ms = 0.0, warp_ms = 0.0;
-                for (int v = 0; v < kCullViews; ++v) {
-                    culled += culledShares(limited.model, limited.model.levels[0],
-                                           viewOf(camera(asset, v, kCullViews)))
-                                  .both *
-                              100.0 / kCullViews;
-                }
-                for (int v = 0; v < kViews; ++v) {
-                    const Camera eye = camera(asset, v, kViews);
-                    ms += draw(limited.scene, eye, settings()).seconds * 1e3 / kViews;
-                    warp_ms += measureWarp(limited.scene, limited.model, limited.model.levels[0],
-                                           viewOf(eye), settings(), kFrames)
-                                   .warp *
-                               1e3 / kViews;
-                }
-                visibility_.rows.push_back(
-                    {{asset.name,
-                      std::string(cones ? "cones" : "no cones") + ", " +
-                          (directions ? std::to_string(directions) + " directions" : "no masks")},
-                     {culled, warp_ms, ms}});
+                limited.emplace_back().model = built.model;
+                limitVisibility(limited.back().model, cones, directions);
+                show(asset, limited.back(), asset.name + "-limited");
+                names.push_back(
+                    std::string(cones ? "cones" : "no cones") + ", " +
+                    (directions ? std::to_string(directions) + " directions" : "no masks"));
             }
         }
         fs::remove(fs::path(options_.folder) / "models" / (asset.name + "-limited.stipple"));
+        std::vector<Shown> shown;
+        for (const Built& b : limited) shown.push_back({&b.scene, settings()});
+        std::vector<double> ms(limited.size(), 0.0), warp_ms = ms;
+        for (const Seen& seen : asset.views) {
+            const std::vector<Timed> timed = drawInTurns(shown, seen.camera);
+            for (size_t i = 0; i < limited.size(); ++i) {
+                ms[i] += timed[i].seconds * 1e3 / kViews;
+                warp_ms[i] +=
+                    measureWarp(limited[i].scene, limited[i].model, limited[i].model.levels[0],
+                                viewOf(seen.camera), settings(), kFrames)
+                        .warp *
+                    1e3 / kViews;
+            }
+        }
+        for (size_t i = 0; i < limited.size(); ++i) {
+            double culled = 0.0;
+            for (int v = 0; v < kCullViews; ++v) {
+                culled += culledShares(limited[i].model, limited[i].model.levels[0],
+                                       viewOf(camera(asset, v, kCullViews)))
+                              .both *
+                          100.0 / kCullViews;
+            }
+            visibility_.rows.push_back({{asset.name, names[i]}, {culled, warp_ms[i], ms[i]}});
+        }
     }
 
     void addQuality(const Asset& asset, const Scene& scene, const std::string& drawn,
                     const std::string& how, RenderSettings s) {
         s.reconstruct = Reconstruct::kPullPush;
-        const Camera eye = camera(asset, 0, kViews);
-        const Timed timed = draw(scene, eye, s, 4);
-        const CompareResult result = compareImages(timed.image, rays(asset.source, eye, 16), pool_);
+        const Timed timed = draw(scene, asset.views[0].camera, s, 4);
+        const CompareResult result = compareImages(timed.image, asset.views[0].many, pool_);
         quality_.rows.push_back(
             {{asset.name, drawn, how},
              {result.psnr, result.flip, double(result.holes->count), timed.seconds * 1e3}});
@@ -362,10 +443,11 @@ private:
         lit.lighting.suns.clear();
         for (int n = 1; n <= 3; ++n) {
             lit.lighting.suns.push_back({glm::normalize(directions[n - 1]), Vec3(2.0f / float(n))});
-            RenderSettings s = settings();
-            const double without = draw(lit, camera(asset, 0, kViews), s).seconds * 1e3;
-            s.shadows = true;
-            const double with = draw(lit, camera(asset, 0, kViews), s).seconds * 1e3;
+            RenderSettings shadows = settings();
+            shadows.shadows = true;
+            const std::vector<Timed> timed =
+                drawInTurns({{&lit, settings()}, {&lit, shadows}}, asset.views[0].camera);
+            const double without = timed[0].seconds * 1e3, with = timed[1].seconds * 1e3;
             shadows_.rows.push_back({{asset.name, std::to_string(n)},
                                      {without, with, (with - without) / n / without * 100.0}});
         }
@@ -378,7 +460,7 @@ private:
             Built other;
             if (!is_default) other = build(asset, {{"directions", directions}}, "variant");
             const Built& b = is_default ? built : other;
-            const Drawn drawn = drawViews(asset, b.scene, settings());
+            const Drawn drawn = drawViews(asset, b.scene);
             projections_.rows.push_back(
                 {{asset.name, directions},
                  {double(b.model.levels[0].size()), double(b.model.levels[0].blocks.size()),
@@ -388,27 +470,29 @@ private:
 
     // Sizes and times relative to the model as it is built by default.
     void measureSizes(const Asset& asset, const Built& built) {
-        const auto drawSeconds = [&](const Scene& scene) {
-            double seconds = 0.0;
-            for (int v = 0; v < kViews; ++v)
-                seconds += draw(scene, camera(asset, v, kViews), settings()).seconds / kViews;
-            return seconds;
-        };
-        const double default_seconds = drawSeconds(built.scene);
         const auto add = [&](const std::string& what, const std::string& value, const Built& b,
-                             double seconds) {
+                             double time, double draw_time) {
             sizes_.rows.push_back(
                 {{asset.name, what, value},
                  {double(b.model.levels[0].size()), double(b.model.levels[0].blocks.size()),
-                  double(b.bytes) / double(built.bytes), seconds / default_seconds,
-                  b.report.seconds}});
+                  double(b.bytes) / double(built.bytes), time, draw_time, b.report.seconds}});
         };
         for (const char* what : {"tolerance angle", "block size"})
-            add(what, std::string(what) == "block size" ? "8" : "25", built, default_seconds);
+            add(what, std::string(what) == "block size" ? "8" : "25", built, 1.0, 1.0);
         for (const Variant& variant : sizeVariants()) {
             progress();
             const Built b = build(asset, variant.set, "variant");
-            add(variant.what, variant.value, b, drawSeconds(b.scene));
+            double time = 0.0, draw_time = 0.0;
+            for (const Seen& seen : asset.views) {
+                const std::vector<Timed> timed =
+                    drawInTurns({{&b.scene, settings()}, {&built.scene, settings()}}, seen.camera);
+                time += timed[0].seconds / timed[1].seconds / kViews;
+                draw_time += timed[0].draw / timed[1].draw / kViews;
+            }
+            add(variant.what, variant.value, b, time, draw_time);
+            // The same model by its block size.
+            if (variant.what == "tolerance angle, as the thesis" && variant.value == "25")
+                add("block size, as the thesis", "8", b, time, draw_time);
         }
         fs::remove(fs::path(options_.folder) / "models" / "variant.stipple");
     }
@@ -441,77 +525,18 @@ private:
     Diagnostics& diagnostics_;
     ThreadPool pool_, one_thread_{1};
     const CancelFlag never_;
-    size_t assets_done_ = 0, steps_done_ = 0;
+    size_t assets_done_ = 0, steps_done_ = 0, steps_ = 1;
 
-    StudyTable models_ = {
-        "models",
-        "Models (thesis: table 8.1)",
-        "Size of the file, blocks and points of the finest level, points a pixel "
-        "of the surface at unit magnification, building; frames at unit "
-        "magnification, against one centred ray; holes of all views against 16.",
-        {"model"},
-        {"MB", "blocks", "points", "points_per_pixel", "build_s", "frame_ms", "psnr_db", "holes"},
-        {}};
-    StudyTable phases_ = {"phases",
-                          "Milliseconds by phase (thesis: table 8.2)",
-                          "One thread. Visibility: cones and masks of all blocks. Warp: points to "
-                          "camera space. Depth: into the z-buffer, what is hidden left out (below "
-                          "0 where that saves warping). Gaps: found and filled. Shade: looked up, "
-                          "shaded, written. Last, the whole frame by pull and push.",
-                          {"model"},
-                          {"visibility_ms", "warp_ms", "depth_ms", "gaps_ms", "shade_ms",
-                           "total_ms", "pull_push_total_ms"},
-                          {}};
-    StudyTable culling_ = {"culling",
-                           "Per cent of blocks culled (thesis: table 8.3)",
-                           "Means of views from everywhere.",
-                           {"model"},
-                           {"neither", "cone", "mask", "both"},
-                           {}};
-    StudyTable sizes_ = {"sizes",
-                         "Size and time over tolerance angle, block size and lattice (thesis: "
-                         "figures 5.5, 5.6, 5.7)",
-                         "Relative to the model as it is built by default. As the thesis: whole "
-                         "blocks, taken as they come; else single samples that others make up for "
-                         "are left out.",
-                         {"model", "what", "value"},
-                         {"points", "blocks", "size", "time", "build_s"},
-                         {}};
-    StudyTable visibility_ = {"visibility",
-                              "Cones and bits of masks (thesis: figure 6.7)",
-                              "Blocks left out, milliseconds of visibility and warp, and of the "
-                              "frame.",
-                              {"model", "tests"},
-                              {"culled_percent", "warp_ms", "frame_ms"},
-                              {}};
-    StudyTable screen_ = {"screen",
-                          "Masks over the screen's subdivision (thesis: figure 6.8)",
-                          "Per cent of blocks culled by masks alone, the screen in 2^n x 2^n parts "
-                          "with a mask each; and with each block's own direction, as drawn here.",
-                          {"model", "n"},
-                          {"culled_percent"},
-                          {}};
-    StudyTable projections_ = {"projections",
-                               "Number of projections (thesis: section 5.1)",
-                               "",
-                               {"model", "projections"},
-                               {"points", "blocks", "build_s", "frame_ms", "psnr_db", "holes"},
-                               {}};
-    StudyTable quality_ = {"quality",
-                           "Coverage, depth threshold and backs with pull and push (thesis: "
-                           "figures 4.9, 7.2, 7.6)",
-                           "Against 16 rays a pixel. Models leave no gaps at unit magnification, "
-                           "so coverage and threshold are shown by points drawn anew on the mesh.",
-                           {"model", "drawn", "how"},
-                           {"psnr_db", "flip", "holes", "frame_ms"},
-                           {}};
-    StudyTable shadows_ = {"shadows",
-                           "What shadows cost (thesis: figure 7.4)",
-                           "Suns; the last column is per cent of the frame without shadows, for "
-                           "each light.",
-                           {"model", "lights"},
-                           {"without_ms", "with_ms", "percent_a_light"},
-                           {}};
+    StudyTable models_ = blockStudyTable("models");
+    StudyTable views_ = blockStudyTable("views");
+    StudyTable phases_ = blockStudyTable("phases");
+    StudyTable culling_ = blockStudyTable("culling");
+    StudyTable sizes_ = blockStudyTable("sizes");
+    StudyTable visibility_ = blockStudyTable("visibility");
+    StudyTable screen_ = blockStudyTable("screen");
+    StudyTable projections_ = blockStudyTable("projections");
+    StudyTable quality_ = blockStudyTable("quality");
+    StudyTable shadows_ = blockStudyTable("shadows");
 };
 
 }  // namespace

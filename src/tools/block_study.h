@@ -12,12 +12,13 @@
 
 namespace stipple {
 
-inline constexpr int kBlockStudyFrames = 12;  // of a view; the fastest counts
+inline constexpr int kBlockStudyFrames = 16;  // of a view; the fastest counts
 
 struct BlockStudyOptions {
     std::vector<std::string> assets;  // files of scenes and models
     std::string folder;               // exists; models/ and pictures/ come here
     int resolution = 256;             // of models, and pixels along a side of pictures
+    std::vector<std::string> tables;  // of blockStudyTables(); none: all
     bool allow_outside = false;
     const CancelFlag* cancel = nullptr;
     std::function<void(const std::string& phase, double fraction)> progress;
@@ -34,6 +35,10 @@ struct StudyTable {
     std::vector<std::string> labels, values;  // what columns are called
     std::vector<StudyTableRow> rows;
 };
+
+// Names of all tables, and one of them without rows.
+std::vector<std::string> blockStudyTables();
+StudyTable blockStudyTable(const std::string& name);
 
 // Builds and draws models; frames are drawn by one thread. Throws as loading, building and
 // rendering do, and kInvalidArgument for assets of the same name.

@@ -98,7 +98,8 @@ std::string blockStudyJson(const std::vector<StudyTable>& tables,
         if (table.name == "sizes") {
             for (const char* kind : {"tolerance angle", "block size"}) {
                 plots.push_back(plotJson(table, kind, kind, "size", "size, relative"));
-                plots.push_back(plotJson(table, kind, kind, "time", "time, relative"));
+                plots.push_back(
+                    plotJson(table, kind, kind, "draw_time", "time of drawing points, relative"));
             }
         }
         if (table.name == "screen")
@@ -109,7 +110,8 @@ std::string blockStudyJson(const std::vector<StudyTable>& tables,
         names += (names.empty() ? "" : ", ") + nameOf(asset);
         pictures.push_back({{"id", nameOf(asset) + ".points"},
                             {"reference", nameOf(asset) + ".rays"},
-                            {"label", nameOf(asset)}});
+                            {"reference_label", nameOf(asset) + ", one ray a pixel"},
+                            {"label", nameOf(asset) + ", points"}});
     }
     return Json{{"schema", 1},
                 {"title", "Point-block models"},
@@ -122,7 +124,8 @@ std::string blockStudyJson(const std::vector<StudyTable>& tables,
                 {"version", STIPPLE_VERSION},
                 {"machine", machineName(1)},
                 {"repetitions", kBlockStudyFrames},
-                {"reference_rays", 1},
+                {"reference_rays", 0},
+                {"varied", Json::array()},
                 {"rows", {{"wanted", 0}, {"there", 0}}},
                 {"settings", Json::object()},
                 {"answers", Json::array()},

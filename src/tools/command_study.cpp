@@ -126,6 +126,11 @@ ExitCode runStudyCommand(const std::vector<std::string>& arguments) {
         ->type_name("N")
         ->check(CLI::Range(16, 1024).description(""))
         ->group("Point blocks");
+    app.add_option("--tables", blocks.tables, "measure these alone, separated by commas")
+        ->type_name("NAME...")
+        ->delimiter(',')
+        ->check(CLI::IsMember(blockStudyTables()).description(""))
+        ->group("Point blocks");
     app.add_flag("--allow-outside", options.allow_outside, "let the scene's paths leave its folder")
         ->group("Running");
     app.add_flag("-q,--quiet", quiet, "no progress, only warnings and errors")->group("Running");
@@ -146,8 +151,10 @@ ExitCode runStudyCommand(const std::vector<std::string>& arguments) {
         studyPointBlocks(blocks, quiet, json);
         return ExitCode::kDone;
     }
-    if (app.count("--resolution"))
-        throw Error(ErrorCode::kInvalidArgument, "--resolution", "needs --point-blocks");
+    for (const char* option : {"--resolution", "--tables"}) {
+        if (app.count(option))
+            throw Error(ErrorCode::kInvalidArgument, option, "needs --point-blocks");
+    }
     if (input.empty()) throw Error(ErrorCode::kInvalidArgument, "", "STUDY is required");
     if (options.folder.empty()) throw Error(ErrorCode::kInvalidArgument, "--output", "is required");
 

@@ -844,9 +844,20 @@ case_study_point_blocks() {
     write_scene
     expect_ok study --point-blocks scene.scene.json -o result --resolution 16 --json out.json
     expect_stdout '^result/report\.html$'
-    [[ $(ls result/*.csv | wc -l) == 9 ]] || fail "not nine tables"
+    [[ $(ls result/*.csv | wc -l) == 10 ]] || fail "not ten tables"
     grep -q '^scene.scene,' result/models.csv || fail "no row of the model"
     grep -q '"name": "culling"' out.json || fail "a table is not in the JSON"
+    # 200 views at unit magnification without a hole, and two other kinds of views.
+    grep -Eq '^scene.scene,unit magnification,200,0,0,0,[0-9]' result/views.csv || fail "holes, or no views"
+    [[ $(wc -l <result/views.csv) == 4 ]] || fail "not three kinds of views"
+    grep -Eq 'warp_million_points_s$' result/phases.csv || fail "no speed of warping"
+    # Blocks of 8 as the thesis has them are those of its tolerance angle.
+    [[ $(grep -c '^scene.scene,"*block size, as the thesis"*,' result/sizes.csv) == 4 ]] || fail "not four sizes of blocks"
+    # Chosen tables alone.
+    expect_ok study --point-blocks scene.scene.json -o some --resolution 16 --tables models,screen
+    [[ $(ls some/*.csv) == $'some/models.csv\nsome/screen.csv' ]] || fail "not the two tables asked for"
+    expect_error 2 'tables' study --point-blocks scene.scene.json -o some --tables sise
+    expect_error 2 'needs --point-blocks' study x.study.json --tables sizes -o result
     expect_error 2 'no study' study x.study.json --point-blocks scene.scene.json -o result
 }
 
