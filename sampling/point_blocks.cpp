@@ -48,6 +48,13 @@ struct Sample {
     Vec3 position = Vec3(0), normal = Vec3(0), albedo = Vec3(0);  // relative to the centre
     float facing = 0.0f;  // cosine of the angle to the projection's direction
     uint32_t finish_key = 0;
+    bool is_double_sided = false;
+
+    // Whether it may be seen from there. Where a part is thin, points of its far side lie where
+    // those of its near side would, but cones leave them out. Shading normals may be a little off.
+    bool mayFace(const Vec3& to_viewer) const {
+        return is_double_sided || glm::dot(normal, to_viewer) > -0.2f;
+    }
 };
 
 Vec3 projectionOf(int index, int count) {
@@ -255,6 +262,7 @@ private:
                     s.normal = hits[k].normal_world;
                     s.albedo = hits[k].albedo;
                     s.facing = std::abs(glm::dot(s.normal, to_viewer));
+                    s.is_double_sided = materials_[hits[k].material].double_sided;
                     s.finish_key = finishKey(materials_, hits[k].material, hits[k].finish);
                     of_row[row].push_back(s);
                 }
@@ -280,7 +288,9 @@ private:
         pool_.forEach(kTests, [&](size_t test, int) {
             throwIfAsked();
             Picture picture = testPicture(to_viewer, int(test), pixel, radius_);
-            for (const Sample& s : chosen) picture.draw(s.position);
+            for (const Sample& s : chosen) {
+                if (s.mayFace(to_viewer)) picture.draw(s.position);
+            }
             std::vector<uint8_t>& of_block = missing[test];
             of_block.assign(block_begin.size() - 1, 0);
             for (size_t b = 0; b + 1 < block_begin.size(); ++b) {
@@ -311,11 +321,15 @@ private:
             throwIfAsked();
             auto picture = std::make_unique<Picture>(
                 testPicture(projectionOf(int(k) / kTests, n), int(k) % kTests, pixel, radius_));
-            for (const Sample& s : chosen) picture->draw(s.position);
+            const Vec3 to_viewer = projectionOf(int(k) / kTests, n);
+            for (const Sample& s : chosen) {
+                if (s.mayFace(to_viewer)) picture->draw(s.position);
+            }
             counts[k].assign(picture->pixels(), 0);
             size_t i;
             for (const Sample& s : chosen) {
-                if (picture->shows(s.position, i) && counts[k][i] < 255) ++counts[k][i];
+                if (s.mayFace(to_viewer) && picture->shows(s.position, i) && counts[k][i] < 255)
+                    ++counts[k][i];
             }
             pictures[k] = std::move(picture);
         });
@@ -333,7 +347,9 @@ private:
             bool is_needed = false;
             for (size_t k = 0; k < n_pictures && !is_needed; ++k) {
                 size_t i;
-                if (!pictures[k]->shows(s.position, i)) continue;
+                if (!s.mayFace(projectionOf(int(k) / kTests, n)) ||
+                    !pictures[k]->shows(s.position, i))
+                    continue;
                 is_needed = counts[k][i] <= 1 || counts[k][i] == 255;
                 shown.emplace_back(uint32_t(k), uint32_t(i));
             }
