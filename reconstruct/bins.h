@@ -22,8 +22,6 @@
 
 namespace stipple {
 
-inline constexpr int kMostBins = 8;  // a pixel
-
 // Two passes; wants layers, so only what opaque surfaces hide is left out. Cost: that of the
 // gaussian, and each point of a blended surface that is not behind an opaque one is shaded.
 std::unique_ptr<TileReconstruction> makeBins(const ReconstructionContext& context);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/layer_bins.h>
 
-#include <reconstruct/bins.h>
 #include <reconstruct/front_means.h>
 
 #include <algorithm>
@@ -147,8 +146,9 @@ void LayerBins::fillBins() {
     for (const Added& added : added_) sorted_[end[added.pixel]++] = added;
     added_.clear();
     const auto key = [](const Added& a) {
-        return std::tuple(a.c.depth, a.cell, a.c.at.x, a.c.at.y, a.c.faces_eye, a.c.alpha,
-                          a.c.radiance.x, a.c.radiance.y, a.c.radiance.z);
+        return std::tuple(a.c.depth, a.cell, a.c.at.x, a.c.at.y, a.c.q, a.c.slope.x, a.c.slope.y,
+                          a.c.faces_eye, a.c.is_closed, a.c.alpha, a.c.radiance.x, a.c.radiance.y,
+                          a.c.radiance.z);
     };
     uint32_t begin = 0;
     for (size_t pixel = 0; pixel + 1 < end.size(); ++pixel) {

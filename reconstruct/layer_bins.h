@@ -10,6 +10,8 @@
 
 namespace stipple {
 
+inline constexpr int kMostBins = 8;  // a pixel
+
 // What a point, or a triangle at a subpixel, adds to a layer.
 struct Contribution {
     Vec2 at = Vec2(0);  // subpixels: where the plane has q, 1 / depth (orthographic: depth)

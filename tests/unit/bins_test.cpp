@@ -3,7 +3,7 @@
 #include "point_cloud_source.h"
 
 #include <gtest/gtest.h>
-#include <reconstruct/bins.h>
+#include <reconstruct/layer_bins.h>
 
 #include <algorithm>
 
