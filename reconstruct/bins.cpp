@@ -158,6 +158,7 @@ private:
             c.at = triangle.plane().at;
             c.faces_eye = triangle.facesEye();
             c.is_closed = block.is_wide;
+            c.is_triangle = true;
             const auto isSeen = [&](int x, int y, float depth) {
                 return !isBehindFront(x, y, depth);
             };

@@ -6,9 +6,10 @@
 //
 // A contribution, a point or a subpixel of a triangle, goes into the bin of its pixel whose range
 // of depths, all taken along their planes to the pixel's middle, holds it, and that is seen from
-// the same side. A bin sums up weights, alpha, and radiance times alpha. Bins that come to overlap
-// are merged. Contributions go in front to back, whatever order they came in. A pixel that then has
-// more than kMostBins has the two that are nearest in 1 / depth made one, the one over the other.
+// the same side; of two triangles at a subpixel each has a bin, however near they are. A bin sums
+// up weights, alpha, and radiance times alpha. Bins that come to overlap are merged. Contributions
+// go in front to back, whatever order they came in. A pixel that then has more than kMostBins has
+// the two that are nearest in 1 / depth made one, the one over the other.
 //
 // Random points would make the sum of a pixel's weights 10 to 20 % wrong. So coverage is not their
 // sum but comes from subpixels: a bin keeps a mask of those that have a contribution, and the masks

@@ -37,7 +37,7 @@ void LayerBins::Bin::merge(const Bin& o) {
     slope += o.slope;
     alpha += o.alpha;
     radiance += o.radiance;
-    closed |= o.closed, exact |= o.exact;
+    closed |= o.closed, exact |= o.exact, triangles |= o.triangles;
 }
 
 LayerBins::LayerBins(const View& view, double k)
@@ -177,11 +177,13 @@ void LayerBins::bin(const Added& added) {
     bin.radiance = c.radiance * c.alpha;
     bin.faces_eye = c.faces_eye;
     (c.is_closed ? bin.closed : bin.exact) = uint64_t(1) << added.cell;
+    if (c.is_triangle && cells_ == subpixels_) bin.triangles = uint64_t(1) << added.cell;
 
     std::vector<Bin>& bins = bins_[added.pixel];
     const float t = tolerance(bin);
     const auto holds = [&](const Bin& b) {
-        return b.faces_eye == bin.faces_eye && bin.q >= b.q_low - t && bin.q <= b.q_high + t;
+        return b.faces_eye == bin.faces_eye && bin.q >= b.q_low - t && bin.q <= b.q_high + t &&
+               !(b.triangles & bin.triangles);
     };
     const auto found = std::find_if(bins.begin(), bins.end(), holds);
     if (found == bins.end()) {
@@ -194,7 +196,7 @@ void LayerBins::bin(const Added& added) {
         Bin& other = bins[i];
         Bin& to = *found;
         if (&other <= &to || other.faces_eye != to.faces_eye || other.q_low > to.q_high ||
-            other.q_high < to.q_low)
+            other.q_high < to.q_low || (other.triangles & to.triangles))
             continue;
         to.merge(other);
         bins.erase(bins.begin() + ptrdiff_t(i));

@@ -19,7 +19,8 @@ struct Contribution {
     Vec2 slope = Vec2(0);  // of q, by subpixel
     float depth = 0.0f;
     bool faces_eye = true;
-    bool is_closed = true;  // on a surface whose holes are to be closed
+    bool is_closed = true;     // on a surface whose holes are to be closed
+    bool is_triangle = false;  // a surface has one of them a subpixel
     float alpha = 1.0f;
     Vec3 radiance = Vec3(0);
 };
@@ -56,6 +57,7 @@ private:
         Vec3 radiance = Vec3(0);
         // Covered cells, row by row: of surfaces that are closed, and of others.
         uint64_t closed = 0, exact = 0;
+        uint64_t triangles = 0;  // cells, where a cell is a subpixel: no other is of this layer
         bool faces_eye = true;
 
         void merge(const Bin& o);

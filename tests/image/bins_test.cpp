@@ -70,6 +70,31 @@ Image render(const Scene& scene, const FrameRequest& r, int threads = 2) {
     return Renderer(scene, pool).render(r).image;
 }
 
+// Where they cross they are as near to each other as one surface is to itself.
+TEST(BinsImage, crossingPanesAreTwoLayersEverywhere) {
+    for (const int triangles : {2, 2000}) {
+        TestScene test;
+        for (const double turn : {0.5, -0.4}) {
+            const double c = std::cos(turn), s = std::sin(turn);
+            Affine at;
+            at.linear = DMat3(DVec3(c, 0, s), DVec3(-s, 0, c), DVec3(0, 1, 0)) * 4.0;
+            at.translation = DVec3(0.013, 0.0, 0.0);
+            test.add(makePrimitive("plane", triangles, Vec3(0.5f), 0.3f), at);
+        }
+        const Scene& scene = test.build();
+        FrameRequest r = request(false);
+        r.camera = lookAt(DVec3(0.0, 0.0, 6.0), DVec3(0.0, 0.0, 0.0));
+        r.settings.samples = 1;
+        r.aovs = {"coverage"};
+        const Image image = render(scene, r);
+        const int coverage = image.channelIndex("coverage");
+        for (int y = 40; y < 110; ++y) {
+            for (int x = 70; x < 130; ++x)
+                ASSERT_NEAR(image.pixel(x, y)[coverage], 0.51f, 0.01f) << x << "," << y;
+        }
+    }
+}
+
 TEST(BinsImage, layersLookAsManyRaysSeeThem) {
     const Scene scene = glassScene();
     ThreadPool pool(2);
