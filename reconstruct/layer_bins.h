@@ -10,7 +10,7 @@
 
 namespace stipple {
 
-inline constexpr int kMostBins = 8;  // a pixel
+inline constexpr int kMostBins = 16;  // a pixel
 
 // What a point, or a triangle at a subpixel, adds to a layer.
 struct Contribution {
