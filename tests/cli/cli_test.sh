@@ -832,10 +832,19 @@ case_study() {
     [[ $(cut -d, -f1 result/rows.csv | sort -u | wc -l) == 22 ]] || fail "a row is there twice"
     grep -q '"title": "a plot"' out.json || fail "no plot in the JSON"
     [[ -s result/pictures/$(sed -n 2p result/rows.csv | cut -d, -f1).png ]] || fail "no picture"
+    # Each row says how it can be repeated, and what disturbed it.
+    for column in scene_hash nest_grid later_frames reference_rays others_share; do
+        head -n 1 result/rows.csv | tr , '\n' | grep -qx "$column" || fail "no column $column"
+    done
     # Nothing is left to do, and nothing is done.
     cp result/rows.csv before.csv
     expect_ok study ball.study.json -o result
     cmp -s before.csv result/rows.csv || fail "rows changed"
+    # Rows beside other work are counted.
+    sed -e '2,$s/,[^,]*,\([^,]*\)$/,0.01,\1/' -e '3s/,[^,]*,\([^,]*\)$/,0.5,\1/' before.csv >result/rows.csv
+    expect_ok study ball.study.json -o result
+    expect_stdout 'during 1 of 21 rows'
+    grep -q '"disturbed": 1' result/report.html || fail "the report does not warn"
     # The standard study of a scene.
     expect_ok study --help
 }
@@ -875,7 +884,9 @@ case_study_errors() {
     sed 's/"repetitions": 3/"repetitions": 0/' ball.study.json >bad.study.json
     expect_error 3 '/repetitions' study bad.study.json -o result
     sed 's/"zoom": \[1, 2\]/"camera": ["side"]/' ball.study.json >bad.study.json
-    expect_error 2 "'side'" study bad.study.json -o result -q
+    # Before anything is measured.
+    expect_error 2 "bad\.study\.json.*'side'" study bad.study.json -o sided -q
+    [[ $(wc -l <sided/rows.csv) == 1 ]] || fail "rows were measured"
     mkdir foreign && echo "a,b" >foreign/rows.csv
     expect_error 3 'foreign/rows\.csv' study ball.study.json -o foreign -q
     expect_error 3 'nowhere/rows\.csv' study --compare nowhere nowhere
