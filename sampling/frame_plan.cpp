@@ -10,6 +10,9 @@ namespace stipple {
 
 namespace {
 
+// Larger nodes, in subpixels, are opened: batches are sorted and hidden as a whole.
+constexpr float kLargestBatch = 384.0f;
+
 // A node of the scene graph that is still to be looked at.
 struct Pending {
     Affine camera_from_child;
@@ -22,11 +25,7 @@ class Planner {
 public:
     Planner(const Scene& scene, const View& view, const RenderSettings& settings,
             bool rasterize_all)
-        : scene_(scene),
-          view_(view),
-          settings_(settings),
-          rasterize_all_(rasterize_all),
-          max_size_(float(settings.tile_size)) {}
+        : scene_(scene), view_(view), settings_(settings), rasterize_all_(rasterize_all) {}
 
     FramePlan plan;
 
@@ -50,7 +49,7 @@ private:
         if (!box.is_visible || !(node.area > 0.0)) return;
         const double bound = box.bound * maxAreaScale(p.camera_from_child.linear);
         const bool has_large = rasterize_all_ || mayBeLarge(node.max_triangle_area, bound);
-        if (!has_large && box.size <= max_size_) {
+        if (!has_large && box.size <= kLargestBatch) {
             addBatch(p, box, node.area * bound);
             return;
         }
@@ -95,12 +94,12 @@ private:
         }
     }
 
-    // Parts no larger than a tile, so that they sort among the other batches.
+    // Parts small enough, so that they sort among the other batches.
     void addMeshBatches(const Pending& p, const Mesh& mesh, const BoxProjection& box,
                         double area_scale) {
         const MeshNode& node = mesh.nodes[p.node];
         if (!box.is_visible) return;
-        if (box.size <= max_size_ || node.child_count == 0) {
+        if (box.size <= kLargestBatch || node.child_count == 0) {
             addBatch(p, box, std::min(node.area * box.bound * area_scale, 1e9));
             return;
         }
@@ -174,7 +173,6 @@ private:
     const View& view_;
     const RenderSettings& settings_;
     const bool rasterize_all_;
-    const float max_size_;  // group nodes larger than a tile are opened
     std::vector<uint32_t> stack_;
 };
 

@@ -22,9 +22,12 @@ inline constexpr double kMostOverdraw = 24.0;
 // Unless its thinner side is no more subpixels than this: then its front cannot be told from the
 // rest, and this many points a subpixel stand for it.
 inline constexpr float kThinNode = 2.0f;
-// A batch is drawn anew in each tile it touches, so what is drawn as points is opened to this share
-// of a tile.
-inline constexpr float kTileShare = 0.0833f;
+// What is drawn as points is drawn anew in each tile it touches, so groups are opened to this many
+// subpixels across. Whatever the tiles: pages of shadows are small, and opening costs more there
+// than points beyond the page. Larger groups leave too much to chance.
+inline constexpr float kLargestGroupRun = 48.0f;
+// Parts of meshes, which are near: the larger they are, the less even are their points.
+inline constexpr float kLargestMeshRun = 32.0f;
 
 // On surfaces, where points would have to close holes, triangles are rasterized from this share of
 // settings.area_threshold on; in foliage points are cheaper for longer.
@@ -45,8 +48,7 @@ inline NodeClass classifyNode(const Mesh& mesh, const MeshNode& node, const BoxP
                                   bound) > double(kSurfaceWidth * kSurfaceWidth);
     if (largest <= settings.area_threshold * (may_be_surface ? kSurfaceThreshold : 1.0)) {
         const double n = settings.samples * bound * facing * node.area;
-        const bool fits =
-            box.size <= kTileShare * float(settings.tile_size) && n <= settings.list_length;
+        const bool fits = box.size <= kLargestMeshRun && n <= settings.list_length;
         const bool is_uniform = box.depth_ratio <= settings.cut_ratio;
         return is_leaf || (is_uniform && (fits || n <= kFewPoints)) ? NodeClass::kPoints
                                                                     : NodeClass::kOpen;

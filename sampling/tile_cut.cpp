@@ -130,7 +130,7 @@ bool TileCut::drawAsPoints(ChildRef ref, uint32_t node_index, const Affine& came
     const double bound = box.bound * maxAreaScale(camera_from_group.linear);
     if (node.max_triangle_area * bound > settings.area_threshold) return false;
     const double n = settings.samples * bound * node.area;
-    if (box.size > kTileShare * float(settings.tile_size) && n > kFewPoints) return false;
+    if (box.size > kLargestGroupRun && n > kFewPoints) return false;
     const double area = double(std::max(box.size, 1.0f)) * double(std::max(box.thickness, 1.0f));
     RunDensity density;
     density.wanted = settings.samples;

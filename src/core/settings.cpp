@@ -142,7 +142,7 @@ std::vector<Entry> makeEntries() {
         number("large_triangle", &S::large_triangle, 0.0, 1e9, "subpixels",
                "triangles of more than this projected area go to OSMesa, before the tiles",
                kOnlySet),
-        number("tile_size", &S::tile_size, 16, 4096, "subpixels", "side of a screen tile",
+        number("tile_size", &S::tile_size, 16, 4096, "subpixels", "largest side of a screen tile",
                kOnlySet),
         number("list_length", &S::list_length, 1, 1 << 24, "points",
                "most points taken from a node's list before the node is opened", kOnlySet),

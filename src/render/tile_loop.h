@@ -17,7 +17,7 @@ using TriangleLookup =
 // One view to be drawn tile by tile.
 struct TileJob {
     View view;
-    int tile_size = 384;                                                      // subpixels
+    int tile_size = 384;                                                      // side, subpixels
     std::function<std::unique_ptr<TileReconstruction>()> makeReconstruction;  // one a thread
     std::function<bool(const SubpixelRect& inner)> is_wanted;  // empty: all tiles are
     PointSource* source = nullptr;                             // nullptr: none
