@@ -47,16 +47,18 @@ struct Place {
         const Vec3 normal = glm::cross(e1, e2);
         const float area2 = glm::dot(normal, normal);
         if (!(area2 > 0.0f)) return;
-        const Vec3 n = safeNormalize(normal), d = safeNormalize(beam.direction);
+        const Vec3 n = safeNormalize(normal);
         // Across the beam it is as wide as the beam; along its shadow it is stretched.
-        Vec3 across = glm::cross(n, d);
-        if (!(glm::dot(across, across) > 1e-8f)) across = e1;
+        Vec3 across = glm::cross(n, beam.direction);
+        const float squared = glm::dot(beam.direction, beam.direction);
+        if (!(glm::dot(across, across) > 1e-8f * squared)) across = e1;
         across = safeNormalize(across) * beam.diameter;
-        const float cosine = beam.direction == Vec3(0.0f) ? 1.0f : std::abs(glm::dot(n, d));
+        const float cosine =
+            squared > 0.0f ? std::abs(glm::dot(n, beam.direction)) / std::sqrt(squared) : 1.0f;
         const Vec3 along = glm::cross(across, n) / std::max(cosine, 1.0f / kMostStretch);
+        const Vec3 first = glm::cross(e2, normal) / area2, second = glm::cross(normal, e1) / area2;
         const auto inEdges = [&](const Vec3& w) {
-            return Vec2(glm::dot(glm::cross(w, e2), normal), glm::dot(glm::cross(e1, w), normal)) /
-                   area2;
+            return Vec2(glm::dot(w, first), glm::dot(w, second));
         };
         side_a = inEdges(across), side_b = inEdges(along);
     }

@@ -84,12 +84,19 @@ std::vector<Vec4> halve(int source_width, int source_height, int width, int heig
     return result;
 }
 
+// std::floor is a call where the processor's own rounding cannot be taken for granted.
+float floorOf(float x) {
+    if (!(std::abs(x) < 1e9f)) return std::floor(x);
+    const float truncated = float(int(x));
+    return truncated > x ? truncated - 1.0f : truncated;
+}
+
 // Brings one coordinate into [0, 1].
 float wrapCoordinate(float u, Wrap wrap) {
     if (!std::isfinite(u)) return 0.0f;
     if (wrap == Wrap::kClamp) return std::clamp(u, 0.0f, 1.0f);
-    if (wrap == Wrap::kRepeat) return u - std::floor(u);
-    const float turn = u - 2.0f * std::floor(u * 0.5f);
+    if (wrap == Wrap::kRepeat) return u - floorOf(u);
+    const float turn = u - 2.0f * floorOf(u * 0.5f);
     return turn > 1.0f ? 2.0f - turn : turn;
 }
 
@@ -99,37 +106,100 @@ int wrapTexel(int i, int n, Wrap wrap) {
     return std::clamp(i, 0, n - 1);
 }
 
-Vec4 sampleLevel(const Texture& texture, const Texture::Level& level, float u, float v) {
-    const auto& linear = byteToLinear(texture.srgb);
+// Four texels and their shares of what is seen between them.
+struct Bilinear {
+    const uint8_t* texels[4];
+    float weights[4];
+
+    Bilinear(const Texture& texture, const Texture::Level& level, float u, float v) {
+        // Both are at least -0.5.
+        const float x = u * float(level.width) + 0.5f, y = v * float(level.height) + 0.5f;
+        const int x1 = int(x), y1 = int(y);
+        const float fx = x - float(x1), fy = y - float(y1);
+        const size_t left = size_t(wrapTexel(x1 - 1, level.width, texture.wrap_u)),
+                     right = size_t(wrapTexel(x1, level.width, texture.wrap_u));
+        const size_t stride = size_t(level.width);
+        const uint8_t* rgba = level.rgba.data();
+        const uint8_t* top =
+            rgba + size_t(wrapTexel(y1 - 1, level.height, texture.wrap_v)) * stride * 4;
+        const uint8_t* bottom =
+            rgba + size_t(wrapTexel(y1, level.height, texture.wrap_v)) * stride * 4;
+        texels[0] = top + left * 4, texels[1] = top + right * 4;
+        texels[2] = bottom + left * 4, texels[3] = bottom + right * 4;
+        weights[0] = (1.0f - fx) * (1.0f - fy), weights[1] = fx * (1.0f - fy);
+        weights[2] = (1.0f - fx) * fy, weights[3] = fx * fy;
+    }
+};
+
+Vec4 nearestTexel(const Texture& texture, const Texture::Level& level, float u, float v) {
+    return readTexel(level, byteToLinear(texture.srgb),
+                     std::min(int(u * float(level.width)), level.width - 1),
+                     std::min(int(v * float(level.height)), level.height - 1));
+}
+
+// The two levels whose texels are nearest in size to what a lookup averages.
+struct LevelPair {
+    const Texture::Level* fine;
+    const Texture::Level* coarse;  // of no account where its share is 0
+    float coarse_share = 0.0f;
+};
+
+LevelPair levelsFor(const Texture& texture, float footprint_uv) {
+    const Texture::Level& finest = texture.levels[0];
+    const float texels = footprint_uv * float(std::max(finest.width, finest.height));
+    if (!(texels > 1.0f)) return {&finest, &finest};
+    const float level = std::min(std::log2(texels), float(texture.levels.size() - 1));
     if (texture.nearest) {
-        return readTexel(level, linear, std::min(int(u * level.width), level.width - 1),
-                         std::min(int(v * level.height), level.height - 1));
+        const Texture::Level* nearest = &texture.levels[size_t(level + 0.5f)];
+        return {nearest, nearest};
     }
-    const float x = u * level.width - 0.5f, y = v * level.height - 0.5f;
-    const int x0 = int(std::floor(x)), y0 = int(std::floor(y));
-    const float fx = x - x0, fy = y - y0;
-    const int rows[2] = {wrapTexel(y0, level.height, texture.wrap_v),
-                         wrapTexel(y0 + 1, level.height, texture.wrap_v)},
-              columns[2] = {wrapTexel(x0, level.width, texture.wrap_u),
-                            wrapTexel(x0 + 1, level.width, texture.wrap_u)};
-    if (texture.is_opaque) {
-        const auto texel = [&](int i, int j) {
-            const uint8_t* t = level.rgba.data() + (size_t(rows[j]) * level.width + columns[i]) * 4;
-            return Vec3(linear[t[0]], linear[t[1]], linear[t[2]]);
-        };
-        return Vec4(glm::mix(glm::mix(texel(0, 0), texel(1, 0), fx),
-                             glm::mix(texel(0, 1), texel(1, 1), fx), fy),
-                    1.0f);
+    const size_t below = size_t(level);
+    return {&texture.levels[below], &texture.levels[std::min(below + 1, texture.levels.size() - 1)],
+            level - float(below)};
+}
+
+// Lookups added up.
+class Lookups {
+public:
+    Lookups(const Texture& texture, const LevelPair& levels)
+        : texture_(texture), levels_(levels), linear_(byteToLinear(texture.srgb)) {}
+
+    void add(Vec2 uv, float share) {
+        const float u = wrapCoordinate(uv.x, texture_.wrap_u),
+                    v = wrapCoordinate(uv.y, texture_.wrap_v);
+        if (texture_.nearest) {
+            sum_.add(nearestTexel(texture_, *levels_.fine, u, v), share);
+            return;
+        }
+        addLevel(*levels_.fine, u, v, share * (1.0f - levels_.coarse_share));
+        if (levels_.coarse_share > 0.0f)
+            addLevel(*levels_.coarse, u, v, share * levels_.coarse_share);
     }
-    Weighted sum;
-    for (int j = 0; j < 2; ++j) {
-        for (int i = 0; i < 2; ++i) {
-            sum.add(readTexel(level, linear, columns[i], rows[j]),
-                    (i ? fx : 1.0f - fx) * (j ? fy : 1.0f - fy));
+    Vec4 color() const {
+        // What is opaque is added to the plain sum alone.
+        return texture_.is_opaque && !texture_.nearest ? Vec4(sum_.plain, 1.0f) : sum_.color();
+    }
+
+private:
+    void addLevel(const Texture::Level& level, float u, float v, float share) {
+        const Bilinear at(texture_, level, u, v);
+        for (int i = 0; i < 4; ++i) {
+            const uint8_t* t = at.texels[i];
+            const Vec3 color(linear_[t[0]], linear_[t[1]], linear_[t[2]]);
+            const float weight = at.weights[i] * share;
+            if (texture_.is_opaque) {
+                sum_.plain += color * weight;
+            } else {
+                sum_.add(Vec4(color, float(t[3]) * (1.0f / 255.0f)), weight);
+            }
         }
     }
-    return sum.color();
-}
+
+    const Texture& texture_;
+    const LevelPair levels_;
+    const std::array<float, 256>& linear_;
+    Weighted sum_;
+};
 
 }  // namespace
 
@@ -172,22 +242,9 @@ void buildMipmaps(Texture& texture) {
 
 Vec4 sampleTexture(const Texture& texture, Vec2 uv, float footprint_uv) {
     if (texture.levels.empty()) return Vec4(1.0f);
-    const float u = wrapCoordinate(uv.x, texture.wrap_u), v = wrapCoordinate(uv.y, texture.wrap_v);
-    const Texture::Level& finest = texture.levels[0];
-    const float texels = footprint_uv * float(std::max(finest.width, finest.height));
-    if (!(texels > 1.0f)) return sampleLevel(texture, finest, u, v);
-    const float level = std::min(std::log2(texels), float(texture.levels.size() - 1));
-    if (texture.nearest) return sampleLevel(texture, texture.levels[size_t(level + 0.5f)], u, v);
-    const size_t below = size_t(level);
-    const float share = level - float(below);
-    const Vec4 fine = sampleLevel(texture, texture.levels[below], u, v);
-    if (share == 0.0f) return fine;
-    const Vec4 coarse = sampleLevel(texture, texture.levels[below + 1], u, v);
-    if (texture.is_opaque) return glm::mix(fine, coarse, share);
-    Weighted sum;
-    sum.add(fine, 1.0f - share);
-    sum.add(coarse, share);
-    return sum.color();
+    Lookups lookups(texture, levelsFor(texture, footprint_uv));
+    lookups.add(uv, 1.0f);
+    return lookups.color();
 }
 
 Vec4 sampleTexture(const Texture& texture, Vec2 uv, Vec2 side_a, Vec2 side_b) {
@@ -198,12 +255,10 @@ Vec4 sampleTexture(const Texture& texture, Vec2 uv, Vec2 side_a, Vec2 side_b) {
     // Taps no farther apart than they are wide, and none where the texels are wider than the area.
     const float taps = std::clamp(std::ceil(a / std::max(b, 1.0f)), 1.0f, float(kMostTextureTaps));
     const float footprint_uv = std::max(a / taps, b) / std::max(size.x, size.y);
-    if (!(taps > 1.0f)) return sampleTexture(texture, uv, footprint_uv);
-    Weighted sum;
-    for (float i = 0.5f; i < taps; i += 1.0f) {
-        sum.add(sampleTexture(texture, uv + side_a * (i / taps - 0.5f), footprint_uv), 1.0f / taps);
-    }
-    return sum.color();
+    Lookups lookups(texture, levelsFor(texture, footprint_uv));
+    for (float i = 0.5f; i < taps; i += 1.0f)
+        lookups.add(uv + side_a * (i / taps - 0.5f), 1.0f / taps);
+    return lookups.color();
 }
 
 }  // namespace stipple
