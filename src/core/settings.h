@@ -48,8 +48,8 @@ struct RenderSettings {
                                   // points; on surfaces a quarter of it
     double large_triangle =
         1024.0;  // triangles larger than this many subpixels go to OSMesa, before the tiles
-    int list_length = 1024;  // most points taken from a node's list before the node is opened
-    int tile_size = 384;     // most subpixels along a side of a screen tile (whole pixels)
+    int list_length = 1024;      // most points taken from a node's list before the node is opened
+    int tile_size = 384;         // most subpixels along a side of a screen tile (whole pixels)
     double visible_size = 32.0;  // meshes no larger than this many subpixels are drawn by what can
                                  // be seen of them from the eye's direction
     bool orientation = false;    // fewer points on parts of meshes that face the eye sideways

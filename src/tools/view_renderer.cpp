@@ -59,7 +59,8 @@ namespace {
 constexpr int kCoarseLevels = 4;
 constexpr double kSparkles[] = {1.0, 10.0, 50.0, 75.0, 100.0};  // per cent
 constexpr double kLeastSamples = 0.001;                         // as the settings table has it
-constexpr double kSmallest = 0.1;  // of the sides, while the camera moves
+constexpr double kSmallest = 0.08;  // of the sides, while the camera moves
+constexpr double kAim = 0.9;        // of the time asked for: frames differ, and some are late
 
 double pointsOf(const RenderSettings& s) {
     return s.samples * s.subpixels * s.subpixels * s.width * s.height;
@@ -132,7 +133,7 @@ void ViewRenderer::run() {
         }
         if (level == 0) {
             const double factor =
-                std::sqrt(wish.frame_seconds / std::max(frame.stats.seconds, 1e-3));
+                std::sqrt(kAim * wish.frame_seconds / std::max(frame.stats.seconds, 1e-3));
             coarse_scale_ =
                 std::clamp(coarse_scale_ * std::clamp(factor, 0.7, 1.2), kSmallest, 1.0);
         }
