@@ -106,6 +106,7 @@ struct Renderer::Impl {
         ReconstructionContext context;
         context.view = view;
         context.settings = request.settings;
+        context.settings.tile_size = tileSide(view, request.settings.tile_size);
         context.materials = &scene.materials;
         context.lighting = &scene.lighting;
         context.light_visibility = visibility.lights.get();

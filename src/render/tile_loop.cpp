@@ -12,14 +12,6 @@ namespace stipple {
 
 namespace {
 
-// At most `largest`, and smaller where the picture would be too few tiles to share among threads.
-int tileSide(const View& view, int largest) {
-    constexpr double kFewestTiles = 12.0;
-    constexpr int kSmallest = 32;
-    const double area = double(view.subWidth()) * double(view.subHeight());
-    return std::min(std::max(int(std::ceil(std::sqrt(area / kFewestTiles))), kSmallest), largest);
-}
-
 struct Tile {
     SubpixelRect inner, outer;
     bool is_wanted = true;
@@ -112,6 +104,13 @@ struct Worker {
 
 }  // namespace
 
+int tileSide(const View& view, int largest) {
+    constexpr double kFewestTiles = 12.0;
+    constexpr int kSmallest = 32;
+    const double area = double(view.subWidth()) * double(view.subHeight());
+    return std::min(std::max(int(std::ceil(std::sqrt(area / kFewestTiles))), kSmallest), largest);
+}
+
 TileTimes runTiles(const TileJob& job, ThreadPool& pool, const FrameRequest& request,
                    FrameStats& stats) {
     const int halo = job.makeReconstruction()->halo();
@@ -183,7 +182,7 @@ void drawTiles(const ReconstructionContext& context, PointSource* source,
     if (request.progress) request.progress("draw", 0.0);
     TileJob job;
     job.view = context.view;
-    job.tile_size = tileSide(context.view, context.settings.tile_size);
+    job.tile_size = context.settings.tile_size;
     job.makeReconstruction = [&] { return makeReconstruction(context); };
     job.source = source;
     job.batches = &batches;

@@ -26,6 +26,11 @@ struct TileJob {
     const char* phase = "draw";  // for progress
 };
 
+// A side for a view's tiles, subpixels: at most `largest`, and smaller where the picture would be
+// too few tiles to share among threads. Of the view alone, so that pictures are the same for any
+// number of them.
+int tileSide(const View& view, int largest);
+
 // Seconds of all threads together.
 struct TileTimes {
     double draw = 0.0, finish = 0.0;

@@ -2,6 +2,7 @@
 // The frame loop over tiles and batches with a source that counts: cancelling, and what is skipped.
 #include <core/error.h>
 #include <gtest/gtest.h>
+#include <render/tile_loop.h>
 
 #include "point_cloud_source.h"
 
@@ -99,6 +100,21 @@ TEST(RenderTileLoop, countsHiddenPointsOnceForAnyTiles) {
         EXPECT_EQ(loop.draw(source, batches, 3).points_culled, 1010u) << tile_size;
         EXPECT_EQ(loop.draw(source, {batches[0]}, 1).points_culled, 0u);
     }
+}
+
+TEST(RenderTileLoop, smallPicturesAreSharedToo) {
+    TestFrame frame;
+    const auto tiles = [&](int width, int height, int subpixels) {
+        frame.settings.width = width, frame.settings.height = height;
+        frame.settings.subpixels = subpixels;
+        const View view = frame.view();
+        const int side = tileSide(view, 384);
+        return ((view.subWidth() + side - 1) / side) * ((view.subHeight() + side - 1) / side);
+    };
+    EXPECT_GE(tiles(128, 72, 1), 12);
+    EXPECT_GE(tiles(640, 480, 1), 12);
+    EXPECT_EQ(tiles(16, 16, 1), 1);       // too little to share
+    EXPECT_EQ(tiles(1920, 1200, 2), 70);  // as large as may be
 }
 
 }  // namespace
