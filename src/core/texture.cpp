@@ -112,7 +112,7 @@ struct Bilinear {
     float weights[4];
 
     Bilinear(const Texture& texture, const Texture::Level& level, float u, float v) {
-        // Both are at least -0.5.
+        // Never negative, so that truncation rounds down.
         const float x = u * float(level.width) + 0.5f, y = v * float(level.height) + 0.5f;
         const int x1 = int(x), y1 = int(y);
         const float fx = x - float(x1), fy = y - float(y1);
@@ -255,6 +255,7 @@ Vec4 sampleTexture(const Texture& texture, Vec2 uv, Vec2 side_a, Vec2 side_b) {
     // Taps no farther apart than they are wide, and none where the texels are wider than the area.
     const float taps = std::clamp(std::ceil(a / std::max(b, 1.0f)), 1.0f, float(kMostTextureTaps));
     const float footprint_uv = std::max(a / taps, b) / std::max(size.x, size.y);
+    if (!(taps > 1.0f)) return sampleTexture(texture, uv, footprint_uv);
     Lookups lookups(texture, levelsFor(texture, footprint_uv));
     for (float i = 0.5f; i < taps; i += 1.0f)
         lookups.add(uv + side_a * (i / taps - 0.5f), 1.0f / taps);
