@@ -218,7 +218,7 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     open_[group_index].reset();
     opened(group_index);
     rebuilt_.push_back(group_index);
-    changes_.any = true;
+    changes_.any = changes_.anywhere = true;
     const double more_instances = group.instances_total - instances_before,
                  more_triangles = group.triangles_total - triangles_before;
     group.instances_total = instances_before, group.triangles_total = triangles_before;

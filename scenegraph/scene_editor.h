@@ -33,6 +33,9 @@ struct SceneChanges {
     // Groups with sums that do not know the areas of what they hold (Group::as_child), old changes
     // included.
     std::vector<uint32_t> stale_groups;
+    // In the world: what has come, gone or moved lies within; or it may be anywhere.
+    std::vector<DBox3> boxes;
+    bool anywhere = false;
     bool assets = false;  // meshes have come
     bool any = false;
 };
@@ -139,6 +142,7 @@ private:
     void refreshAll(uint32_t group);
     void countInstances(uint32_t group, double instances, double triangles);
     void note(uint32_t group, uint32_t node);
+    void noteBox(uint32_t group, const DBox3& box);
     std::vector<uint32_t> withHolders(std::vector<uint32_t> groups) const;
     void markEdited(InstanceId id);
 

@@ -11,6 +11,7 @@ namespace {
 
 constexpr uint32_t kMostResidents = 32;  // of a leaf, before it is split
 constexpr size_t kMostChanges = 1 << 16;
+constexpr size_t kMostBoxes = 256;
 
 uint32_t placesOf(const GroupNode& node) { return node.resident_count + node.free_count; }
 
@@ -22,7 +23,8 @@ void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_
     addUse(id, child);
     markEdited(id);
     DVec3 center, half;
-    instanceBox(childSums(scene_, child), group_from_child, center, half);
+    if (instanceBox(childSums(scene_, child), group_from_child, center, half))
+        noteBox(id.group, {center - half, center + half});
     const uint32_t node = chooseNode(scene_.groups[id.group], center, half);
     addResident(id.group, node, id.index, child, group_from_child);
     uint32_t changed = node;
@@ -47,6 +49,9 @@ void SceneEditor::take(InstanceId id) {
     Group& group = scene_.groups[id.group];
     const uint32_t slot = open.slot_of[id.index], node_index = open.node_of[slot];
     const ChildRef child = group.instances.child(slot);
+    DVec3 center, half;
+    if (instanceBox(childSums(scene_, child), group.instances.groupFromChild(slot), center, half))
+        noteBox(id.group, {center - half, center + half});
     removeUse(id, child);
     markEdited(id);
     const bool is_group = child.isGroup();
@@ -332,6 +337,20 @@ void SceneEditor::note(uint32_t group, uint32_t node) {
         changes_.all_nodes = true;
         changes_.nodes.clear();
     }
+}
+
+// Of a box in a group: everywhere that the group is instanced.
+void SceneEditor::noteBox(uint32_t group, const DBox3& box) {
+    if (changes_.anywhere) return;
+    if (group == scene_.root) changes_.boxes.push_back(box);
+    const Uses& uses = uses_[group];
+    if (uses.places.size() != uses.count || changes_.boxes.size() > kMostBoxes) {
+        changes_.anywhere = true;
+        changes_.boxes.clear();
+        return;
+    }
+    for (const InstanceId& use : uses.places)
+        noteBox(use.group, transformBox(groupFromChild(use), box));
 }
 
 void SceneEditor::refreshUpwards(uint32_t group_index, uint32_t node_index) {

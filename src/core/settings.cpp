@@ -81,7 +81,8 @@ Entry onOff(const char* key, bool RenderSettings::*member, const char* help,
 // "off" is another name for 0 megabytes.
 Entry cacheMb() {
     Entry entry = number("cache_mb", &RenderSettings::cache_mb, 0, 1 << 24, "MB",
-                         "memory for point lists that later frames use again");
+                         "memory for point lists that later frames use again; a quarter as much "
+                         "for shadow maps");
     entry.info.values += "|off";
     entry.set = [set = entry.set](RenderSettings& settings, const std::string& text) {
         return set(settings, text == "off" ? "0" : text);

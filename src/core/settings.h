@@ -41,8 +41,9 @@ struct RenderSettings {
     double exposure = 0.0;    // stops, beside the scene's
     Tone tone = Tone::kNone;  // of pictures that are shown (PNG)
     uint64_t seed = 1;
-    int threads = 0;              // 0: one a core
-    int cache_mb = 256;           // point lists kept between frames; 0: off
+    int threads = 0;  // 0: one a core
+    // Kept between frames: point lists, and a quarter as much of shadow maps; 0: off.
+    int cache_mb = 256;
     double cut_ratio = 1.41;      // largest ratio of depths within a node of the cut
     double area_threshold = 4.0;  // triangles larger than this many subpixels are not drawn as
                                   // points; on surfaces a quarter of it
@@ -55,6 +56,8 @@ struct RenderSettings {
     bool orientation = false;    // fewer points on parts of meshes that face the eye sideways
     bool culling = true;         // skip batches behind what a tile has already drawn
     bool fill = true;            // per-pixel: occlusion removal and filling
+
+    bool operator==(const RenderSettings&) const = default;
 };
 
 // Whether blended surfaces are drawn in all their layers, each point with its alpha, for a

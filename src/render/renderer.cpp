@@ -54,6 +54,7 @@ struct Renderer::Impl {
     const Scene& scene;
     ThreadPool& pool;
     RandomizedSampler sampler;
+    ShadowCache shadow_cache;
     std::unique_ptr<Rasterizer> rasterizer;  // started when first needed
     RasterTarget target;
     std::unique_ptr<RayCaster> caster;  // built when first needed, for caster_origin
@@ -89,7 +90,7 @@ struct Renderer::Impl {
         if (has_shadows) {
             drawer.phase = "shadows";
             if (request.progress) request.progress("shadows", 0.0);
-            visibility.lights = makeShadowMaps(scene, view, look, drawer, stats);
+            visibility.lights = makeShadowMaps(scene, view, look, drawer, shadow_cache, stats);
         }
         if (request.settings.ao) {
             visibility.ambient = std::make_unique<ScreenOcclusion>(view, std::move(look),
@@ -176,6 +177,7 @@ Renderer::~Renderer() = default;
 void Renderer::sceneChanged(const SceneChanges& changes) {
     if (!changes.any) return;
     impl_->sampler.sceneChanged(changes);
+    impl_->shadow_cache.sceneChanged(changes);
     impl_->caster.reset();
     if (changes.assets) impl_->rasterizer.reset();
 }

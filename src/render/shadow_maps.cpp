@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 namespace stipple {
 
@@ -15,6 +17,9 @@ constexpr double kPageMargin = 8.0;
 // A level's pages lie within a rectangle of at most so many along a side; farther apart, they are
 // taken from the next coarser level.
 constexpr int64_t kMostPagesAlong = 1024;
+// Pages are drawn in views of so many along a side, that lie still in the world as they do, and one
+// more around. So a page is the same whichever others a frame needs.
+constexpr int64_t kPagesOfView = 16;
 // A coarser page stands by for what the first look has missed, so many levels up.
 constexpr int kSpareLevels = 2;
 // Below this share of its colour nothing is seen through haze.
@@ -28,19 +33,6 @@ constexpr float kBehindSeen = 1.1f;
 constexpr float kUnevenness = 0.1f;
 // And what floats may lose of a depth.
 constexpr float kRounding = 1e-6f;
-
-// A page in the world: of a level, at whole multiples of its size from the origin.
-struct PageKey {
-    int exponent = 0;
-    int64_t x = 0, y = 0;
-
-    bool operator<(const PageKey& o) const {
-        return exponent != o.exponent ? exponent < o.exponent : y != o.y ? y < o.y : x < o.x;
-    }
-    bool operator==(const PageKey& o) const {
-        return exponent == o.exponent && y == o.y && x == o.x;
-    }
-};
 
 void sortUnique(std::vector<PageKey>& pages) {
     std::sort(pages.begin(), pages.end());
@@ -127,20 +119,14 @@ private:
     size_t most_ = kFewPages;
 };
 
-// What a light's view starts from.
-struct LightSpace {
-    DMat3 world_from_light = DMat3(1.0);
-    bool is_lamp = false;
-    DVec3 lamp = DVec3(0.0);  // its place, world
-    float far_z = kInfinity;  // of a lamp: nothing behind needs to cast shadows
-};
-
 class ShadowBuilder {
 public:
-    ShadowBuilder(const Scene& scene, const View& view, const DepthDrawer& drawer)
+    ShadowBuilder(const Scene& scene, const View& view, const DepthDrawer& drawer,
+                  ShadowCache& cache)
         : scene_(scene),
           view_(view),
           drawer_(drawer),
+          cache_(cache),
           settings_(drawer.request.settings),
           sizes_(view, settings_.shadow_texel, {}, {}) {
         const DBox3 bounds = sceneBounds(scene);
@@ -214,7 +200,8 @@ private:
             space.is_lamp = true;
             space.lamp = lamp.position;
             space.world_from_light = glm::transpose(face_from_lamp[f] * shadow.lamp_from_world);
-            space.far_z = far_z[f] * kBehindSeen;
+            // A power of two: pages are of use to other frames too.
+            space.far_z = std::exp2(std::ceil(std::log2(far_z[f] * kBehindSeen)));
             shadow.faces[f] = drawMap(space, pages[f].take());
         }
         return shadow;
@@ -259,69 +246,102 @@ private:
             level.page_slot[size_t(pages[i].y - y0) * size_t(level.columns) +
                             size_t(pages[i].x - x0)] = int32_t(i);
         }
-        level.depth.assign(pages.size() * kPageTexels * kPageTexels, kInfinity);
-
-        View view;
-        view.width = level.columns * kPageTexels;
-        view.height = level.rows * kPageTexels;
-        view.camera_from_world = glm::transpose(space.world_from_light);
-        view.focal = 1.0 / double(level.texel);
+        drawMissing(pages, space);
+        double origin_z = std::numeric_limits<double>::infinity();
+        for (const PageKey& key : pages) {
+            level.pages.push_back({cache_.find(space, key)});
+            origin_z = std::min(origin_z, level.pages.back().page->origin_z);
+        }
+        for (ShadowLevel::PlacedPage& placed : level.pages)
+            placed.behind = float(placed.page->origin_z - origin_z);
         if (space.is_lamp) {
             level.corner_x = double(x0) * kPageTexels;
             level.corner_y = double(y0) * kPageTexels;
-            view.eye_world = space.lamp;
-            view.center_x = -level.corner_x;
-            view.center_y = -level.corner_y;
-            view.near_z = kLampClearance;
-            view.far_z = space.far_z;
         } else {
             const double page = double(level.texel) * kPageTexels;
-            double z_min, z_max;
-            const DVec3 corner(double(x0) * page, double(y0) * page, 0.0);
-            depthRange(space.world_from_light, corner, level.columns * page, level.rows * page,
-                       z_min, z_max);
-            if (!(z_min <= z_max)) return true;  // nothing there
-            level.origin = DVec3(corner.x, corner.y, z_min - 1.0);
-            view.orthographic = true;
-            view.eye_world = space.world_from_light * level.origin;
-            view.near_z = 0.5f;
-            view.far_z = float(z_max - z_min + 2.0);
+            level.origin = DVec3(double(x0) * page, double(y0) * page, origin_z);
         }
-        drawPages(view, level);
         return true;
     }
 
-    void drawPages(const View& view, ShadowLevel& level) {
-        RenderSettings settings = settings_;
-        settings.subpixels = 1;
-        settings.samples = 1.0;
-        settings.tile_size = kPageTexels;
-        settings.splat_world = 0.0;
-        settings.visible_size = 0.0;  // the same lists as the camera's, and no loss of depth
-        settings.large_triangle = double(kInfinity);  // the tiles' rasterizer draws no page in vain
-        const auto slotOf = [&](const SubpixelRect& inner) {
-            return level.page_slot[size_t(inner.y0 / kPageTexels) * size_t(level.columns) +
-                                   size_t(inner.x0 / kPageTexels)];
+    // Of one level, sorted: those that the cache lacks.
+    void drawMissing(const std::vector<PageKey>& pages, const LightSpace& space) {
+        std::map<PageKey, std::vector<PageKey>> views;
+        for (const PageKey& key : pages) {
+            if (cache_.find(space, key)) continue;
+            const auto part = [](int64_t at) {
+                return (at >= 0 ? at : at - (kPagesOfView - 1)) / kPagesOfView;
+            };
+            views[{key.exponent, part(key.x), part(key.y)}].push_back(key);
+        }
+        for (const auto& [part, missing] : views) drawPages(part, missing, space);
+    }
+
+    // Pages of one view.
+    void drawPages(const PageKey& part, const std::vector<PageKey>& keys, const LightSpace& space) {
+        constexpr int kAlong = int(kPagesOfView) + 2;
+        const int64_t x0 = part.x * kPagesOfView - 1, y0 = part.y * kPagesOfView - 1;
+        const double texel = std::ldexp(1.0, part.exponent), page = texel * kPageTexels;
+        std::vector<std::shared_ptr<ShadowPage>> drawn(size_t(kAlong) * kAlong);
+        std::vector<std::shared_ptr<ShadowPage>> own;
+        for (const PageKey& key : keys) {
+            own.push_back(std::make_shared<ShadowPage>());
+            drawn[size_t(key.y - y0) * kAlong + size_t(key.x - x0)] = own.back();
+        }
+        View view;
+        view.width = view.height = kAlong * kPageTexels;
+        view.camera_from_world = glm::transpose(space.world_from_light);
+        view.focal = 1.0 / texel;
+        bool is_empty = false;
+        if (space.is_lamp) {
+            view.eye_world = space.lamp;
+            view.center_x = -double(x0) * kPageTexels;
+            view.center_y = -double(y0) * kPageTexels;
+            view.near_z = kLampClearance;
+            view.far_z = space.far_z;
+        } else {
+            const DVec3 corner(double(x0) * page, double(y0) * page, 0.0);
+            double z_min, z_max;
+            depthRange(space.world_from_light, corner, kAlong * page, z_min, z_max);
+            is_empty = !(z_min <= z_max);
+            const double origin_z = is_empty ? 0.0 : std::floor(z_min) - 1.0;
+            for (const auto& p : own) p->origin_z = origin_z;
+            view.orthographic = true;
+            view.eye_world = space.world_from_light * DVec3(corner.x, corner.y, origin_z);
+            view.near_z = 0.5f;
+            view.far_z = float(z_max - origin_z + 1.0);
+        }
+        if (!is_empty) drawDepths(view, drawn);
+        for (size_t i = 0; i < keys.size(); ++i) cache_.keep(space, keys[i], own[i]);
+    }
+
+    // pages: rows of the view's; null: not wanted.
+    void drawDepths(const View& view, const std::vector<std::shared_ptr<ShadowPage>>& pages) {
+        const auto pageOf = [&](const SubpixelRect& inner) {
+            return pages[size_t(inner.y0 / kPageTexels) * size_t(view.width / kPageTexels) +
+                         size_t(inner.x0 / kPageTexels)]
+                .get();
         };
         const TakeDepths take = [&](const SubpixelRect& inner, const DepthTile& tile) {
-            float* out = level.depth.data() + size_t(slotOf(inner)) * kPageTexels * kPageTexels;
+            float* out = pageOf(inner)->depth.data();
             for (int y = inner.y0; y < inner.y1; ++y) {
                 for (int x = inner.x0; x < inner.x1; ++x)
                     *out++ = DepthTile::depthOf(tile.row(y)[x]);
             }
         };
         drawer_.draw(
-            view, settings, [&](const SubpixelRect& inner) { return slotOf(inner) >= 0; }, false,
-            take, drawn_);
+            view, shadowSettings(settings_),
+            [&](const SubpixelRect& inner) { return pageOf(inner) != nullptr; }, false, take,
+            drawn_);
     }
 
-    // Depths, from the sun, at which the column over a rectangle of sun space meets the scene's
+    // Depths, from the sun, at which the column over a square of sun space meets the scene's
     // bounds: casters outside of what the camera sees are in it. Empty (z_min > z_max): it does
     // not.
-    void depthRange(const DMat3& world_from_sun, const DVec3& corner, double width, double height,
-                    double& z_min, double& z_max) const {
-        const DVec3 p = world_from_sun * corner, u = world_from_sun[0] * width,
-                    v = world_from_sun[1] * height, along = world_from_sun[2];
+    void depthRange(const DMat3& world_from_sun, const DVec3& corner, double side, double& z_min,
+                    double& z_max) const {
+        const DVec3 p = world_from_sun * corner, u = world_from_sun[0] * side,
+                    v = world_from_sun[1] * side, along = world_from_sun[2];
         z_min = -1e30, z_max = 1e30;
         for (int i = 0; i < 3; ++i) {
             const double low = p[i] + std::min(u[i], 0.0) + std::min(v[i], 0.0),
@@ -340,6 +360,7 @@ private:
     const Scene& scene_;
     const View& view_;
     const DepthDrawer& drawer_;
+    ShadowCache& cache_;
     const RenderSettings& settings_;
     const ShadowPages sizes_;  // empty: for the sizes it asks for
     DVec3 bounds_min_, bounds_max_;
@@ -351,10 +372,13 @@ private:
 
 std::unique_ptr<ShadowPages> makeShadowMaps(const Scene& scene, const View& view,
                                             const FirstLook& look, const DepthDrawer& drawer,
-                                            FrameStats& stats) {
+                                            ShadowCache& cache, FrameStats& stats) {
     const Stopwatch watch;
-    std::unique_ptr<ShadowPages> maps = ShadowBuilder(scene, view, drawer).build(look, stats);
-    stats.shadow_bytes = maps->bytes();
+    cache.begin(drawer.request.settings);
+    std::unique_ptr<ShadowPages> maps =
+        ShadowBuilder(scene, view, drawer, cache).build(look, stats);
+    cache.end((size_t(drawer.request.settings.cache_mb) << 20) / 4);
+    stats.shadow_bytes = std::max(maps->bytes(), cache.bytes());
     stats.phases.emplace_back("shadows", watch.seconds());
     return maps;
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Draws the shadow maps of a frame: a first look has found what is visible and how large a pixel is
-// there, so which pages of which texel size are needed; each level then is a frame of the
-// randomized sampler in a view from the light, with a depth sink. Based on: Wand et al. 2001
-// ("Shadows").
+// there, so which pages of which texel size are needed; those that no frame before has drawn then
+// are frames of the randomized sampler in views from the light, with a depth sink. Based on: Wand
+// et al. 2001 ("Shadows").
 #pragma once
 
 #include <render/depth_drawer.h>
-#include <render/shadow_pages.h>
+#include <render/shadow_cache.h>
 
 #include <memory>
 
@@ -17,6 +17,6 @@ namespace stipple {
 // threads. The sampler's plan is replaced. Memory: 64 KiB a page.
 std::unique_ptr<ShadowPages> makeShadowMaps(const Scene& scene, const View& view,
                                             const FirstLook& look, const DepthDrawer& drawer,
-                                            FrameStats& stats);
+                                            ShadowCache& cache, FrameStats& stats);
 
 }  // namespace stipple

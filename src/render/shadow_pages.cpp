@@ -22,8 +22,9 @@ float depthAt(const ShadowLevel& level, int x, int y) {
         return std::numeric_limits<float>::quiet_NaN();
     const int32_t slot = level.page_slot[size_t(row) * size_t(level.columns) + size_t(column)];
     if (slot < 0) return std::numeric_limits<float>::quiet_NaN();
-    return level.depth[(size_t(slot) * kPageTexels + size_t(y % kPageTexels)) * kPageTexels +
-                       size_t(x % kPageTexels)];
+    const ShadowLevel::PlacedPage& placed = level.pages[size_t(slot)];
+    return placed.behind +
+           placed.page->depth[size_t(y % kPageTexels) * kPageTexels + size_t(x % kPageTexels)];
 }
 
 // How much nearer to the light the same patch may be elsewhere in the texels around a sample. A
@@ -149,7 +150,7 @@ size_t ShadowPages::bytes() const {
     size_t bytes = 0;
     const auto add = [&](const Map& map) {
         for (const ShadowLevel& level : map.shadow.levels)
-            bytes += level.depth.capacity() * sizeof(float) +
+            bytes += level.pages.size() * sizeof(ShadowPage) +
                      level.page_slot.capacity() * sizeof(int32_t);
     };
     for (const Map& sun : suns_) add(sun);

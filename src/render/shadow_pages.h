@@ -12,23 +12,37 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <vector>
 
 namespace stipple {
 
 inline constexpr int kPageTexels = 128;  // along a side
 
-// One texel size. Light space: depth z away from the light. Texels of a sun's are metres of x and
-// y; those of a lamp's are slopes, x/z and y/z from the lamp.
+// Light space: depth z away from the light.
+struct ShadowPage {
+    double origin_z = 0.0;  // light space, metres: from which depths count
+    // Metres, rows of texels; infinite where nothing is.
+    std::array<float, size_t(kPageTexels) * kPageTexels> depth;
+
+    ShadowPage() { depth.fill(kInfinity); }
+};
+
+// One texel size. Texels of a sun's are metres of x and y; those of a lamp's are slopes, x/z and
+// y/z from the lamp.
 struct ShadowLevel {
+    struct PlacedPage {
+        std::shared_ptr<const ShadowPage> page;
+        float behind = 0.0f;  // metres that its depths count from, beyond the level's origin
+    };
     float texel = 1.0f;  // metres or slope
-    // In light space, metres: a sun's corner of the rectangle that holds the pages, and the depth
-    // from which stored depths count; a lamp's place.
+    // In light space, metres: a sun's corner of the rectangle that holds the pages, and the least
+    // depth from which one's depths count; a lamp's place.
     DVec3 origin = DVec3(0.0);
     double corner_x = 0.0, corner_y = 0.0;  // of the rectangle, from the origin, texels
     int columns = 0, rows = 0;              // of pages
     std::vector<int32_t> page_slot;         // columns * rows; -1: no page
-    std::vector<float> depth;  // metres, page by page, rows of texels; infinite where nothing is
+    std::vector<PlacedPage> pages;
 };
 
 // Of a sun, or of a face of the cube around a lamp.

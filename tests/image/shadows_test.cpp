@@ -296,5 +296,104 @@ TEST(Shadows, everyReconstructionTakesThem) {
     }
 }
 
+// What frames before have drawn is what this one would draw.
+TEST(Shadows, keptPagesAreThoseOfAFreshFrame) {
+    Scene scene = wood(true);
+    scene.lighting.points = woodByNight().lighting.points;
+    FrameRequest r = woodRequest();
+    r.settings.width = kWidth / 2, r.settings.height = kHeight / 2;
+    r.settings.shadows = true;
+    ThreadPool pool(2);
+    Renderer renderer(scene, pool);
+    uint64_t first = 0;
+    for (const double x : {0.0, 5.0, -30.0, 5.0}) {
+        r.camera = lookAt(DVec3(x, 60, 110), DVec3(0, 6, -20));
+        const Frame frame = renderer.render(r);
+        EXPECT_EQ(frame.image.data, Renderer(scene, pool).render(r).image.data) << x;
+        if (x == 0.0) first = frame.stats.shadow_points;
+        EXPECT_GT(first, uint64_t(0));
+        if (x == 5.0) {
+            EXPECT_LT(frame.stats.shadow_points, first / 2);
+        }
+    }
+    EXPECT_EQ(renderer.render(r).stats.shadow_points, uint64_t(0));
+    // What is seen, not how it is drawn, asks for pages.
+    r.settings.exposure = 1.0;
+    EXPECT_EQ(renderer.render(r).stats.shadow_points, uint64_t(0));
+    r.settings.seed = 2;
+    EXPECT_EQ(renderer.render(r).image.data, Renderer(scene, pool).render(r).image.data);
+}
+
+TEST(Shadows, pagesAreKeptWithinTheirMemory) {
+    Scene scene = wood(true);
+    FrameRequest r = woodRequest();
+    r.settings.shadows = true;
+    ThreadPool pool(2);
+    Renderer renderer(scene, pool);
+    const Frame first = renderer.render(r);
+    const auto rendersAgain = [&](int megabytes) {
+        r.settings.cache_mb = megabytes;
+        renderer.render(r);
+        const Frame frame = renderer.render(r);
+        EXPECT_EQ(frame.image.data, first.image.data) << megabytes;
+        return frame.stats.shadow_points;
+    };
+    EXPECT_EQ(rendersAgain(256), uint64_t(0));
+    EXPECT_EQ(rendersAgain(0), first.stats.shadow_points);
+    const uint64_t some = rendersAgain(4);  // 16 pages
+    EXPECT_GT(some, uint64_t(0));
+    EXPECT_LT(some, first.stats.shadow_points);
+}
+
+// One of two balls above a plane, in a group of its own or not, is moved, taken away and brought
+// back: its shadow goes with it, and pages that see the other alone stay.
+TEST(Shadows, keptPagesFollowEdits) {
+    for (const bool is_nested : {false, true}) {
+        for (const bool has_lamp : {false, true}) {
+            ShadowScene t(Vec3(-1.0f, 0.7f, 0.3f));
+            if (has_lamp) {
+                t.scene.lighting.suns.clear();
+                t.scene.lighting.points.push_back(lampAt(DVec3(-3, 4, 1)));
+            }
+            const uint32_t ball = addMesh(t.scene, makePrimitive("sphere", 2000, Vec3(0.6f)));
+            Group stand;
+            stand.instances = InstanceStore(DBox3{DVec3(-200), DVec3(200)});
+            stand.instances.add(ChildRef::mesh(ball), placed(DVec3(0, 1.2, 0)));
+            if (is_nested) {
+                t.scene.groups.push_back(stand);
+                t.root.instances.add(ChildRef::group(0), placed(DVec3(0.5, 0, 0)));
+            } else {
+                t.root.instances.add(ChildRef::mesh(ball), placed(DVec3(0.5, 1.2, 0)));
+            }
+            t.root.instances.add(ChildRef::mesh(ball), placed(DVec3(-3.5, 0.5, -4)));
+            Scene& scene = t.build();
+            FrameRequest r = request();
+            r.settings.shadows = true;
+            ThreadPool pool(2);
+            Renderer renderer(scene, pool);
+            SceneEditor editor(scene);
+            const Frame before = renderer.render(r);
+            const auto isRight = [&](const char* what) {
+                renderer.sceneChanged(editor.takeChanges());
+                const Frame frame = renderer.render(r), fresh = Renderer(scene, pool).render(r);
+                EXPECT_LT(frame.stats.shadow_points, fresh.stats.shadow_points) << what;
+                EXPECT_GT(compareImages(frame.image, fresh.image, pool).psnr, 60.0) << what;
+                return compareImages(frame.image, before.image, pool).psnr;
+            };
+            const InstanceId id = is_nested ? editor.find({1, 0}) : editor.find({1});
+            const ChildRef child = editor.child(id);
+            const Affine at = editor.groupFromChild(id);
+            Affine aside = at;
+            aside.translation += DVec3(1.5, 0.3, -1.0);
+            editor.move(id, aside);
+            EXPECT_LT(isRight("moved"), 40.0);
+            editor.remove(id);
+            EXPECT_LT(isRight("removed"), 40.0);
+            editor.restore(id, child, at);
+            EXPECT_GT(isRight("restored"), 60.0);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace stipple
