@@ -5,9 +5,35 @@
 
 namespace stipple {
 
+template <class Of>
+float LightOnPlaces::mean(const SurfaceSample& sample, const Of& of) const {
+    if (count_ == 0) return of(sample);
+    SurfaceSample at = sample;
+    float sum = 0.0f;
+    for (int i = 0; i < count_; ++i) {
+        at.position_camera = places_[i].position_camera;
+        at.depth = at.position_camera.z;
+        sum += of(at) * places_[i].share;
+    }
+    return sum;
+}
+
+float LightOnPlaces::ofSun(size_t sun, const SurfaceSample& sample) const {
+    return mean(sample, [&](const SurfaceSample& at) { return lights_->ofSun(sun, at); });
+}
+
+float LightOnPlaces::ofLamp(size_t lamp, const SurfaceSample& sample) const {
+    return mean(sample, [&](const SurfaceSample& at) { return lights_->ofLamp(lamp, at); });
+}
+
+float LightOnPlaces::of(const SurfaceSample& sample, const Vec3& normal_world) const {
+    return mean(sample, [&](const SurfaceSample& at) { return ambient_->of(at, normal_world); });
+}
+
 Vec3 SubpixelShader::shadeSample(const SurfaceSample& sample) const {
     return shade(sample, (*context_.materials)[sample.material], *context_.lighting, context_.view,
-                 context_.light_visibility, context_.ambient_visibility);
+                 context_.light_visibility ? &light_ : nullptr,
+                 context_.ambient_visibility ? &light_ : nullptr);
 }
 
 void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y) {
@@ -49,9 +75,7 @@ uint32_t SubpixelShader::membersBeside(const Cell& cell, uint32_t members) const
     return beside;
 }
 
-bool SubpixelShader::showMembers(const SampleLookup& lookup, const Cell& cell, uint32_t members) {
-    const int first = std::countr_zero(members);
-    if (members == uint32_t(1) << first || cell.number[first] == varied_number_) return false;
+Vec3 SubpixelShader::middleOf(const Cell& cell, uint32_t members, Vec2& p_sub) const {
     // Of a plane 1 / depth (orthographic: depth) is affine in the picture.
     const bool orthographic = context_.view.orthographic;
     float x = 0.0f, y = 0.0f, q = 0.0f;
@@ -62,13 +86,33 @@ bool SubpixelShader::showMembers(const SampleLookup& lookup, const Cell& cell, u
         x += float(cell.x[i]), y += float(cell.y[i]);
         q += orthographic ? depth : 1.0f / depth;
     }
-    const Vec2 at(x / n + 0.5f, y / n + 0.5f);
-    const float depth = orthographic ? q / n : n / q;
+    p_sub = Vec2(x / n + 0.5f, y / n + 0.5f);
     Vec3 origin, direction;
-    context_.view.ray(at.x, at.y, origin, direction);
-    if (showShared(lookup, origin + direction * depth, cell.number[first], at, n)) return true;
-    varied_number_ = cell.number[first];
-    return false;
+    context_.view.ray(p_sub.x, p_sub.y, origin, direction);
+    return origin + direction * (orthographic ? q / n : n / q);
+}
+
+bool SubpixelShader::showMembers(const SampleLookup& lookup, const Cell& cell, uint32_t members) {
+    const int first = std::countr_zero(members);
+    if (members == uint32_t(1) << first ||
+        varied_numbers_[cell.number[first] % kVaried] == cell.number[first])
+        return false;
+    const float n = float(std::popcount(members));
+    Vec2 p_sub;
+    const Vec3 middle = middleOf(cell, members, p_sub);
+    LightOnPlaces::Place places[LightOnPlaces::kMost];
+    int count = 0;
+    for (uint32_t left = hasVariedLight() ? members : 0; left;) {
+        const uint32_t beside = membersBeside(cell, left);
+        left &= ~beside;
+        Vec2 unused;
+        places[count++] = {middleOf(cell, beside, unused), float(std::popcount(beside)) / n};
+    }
+    light_.set(places, count);
+    const bool is_shared = showShared(lookup, middle, cell.number[first], p_sub, n);
+    light_.set(nullptr, 0);
+    if (!is_shared) varied_numbers_[cell.number[first] % kVaried] = cell.number[first];
+    return is_shared;
 }
 
 bool SubpixelShader::showShared(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,

@@ -3,25 +3,61 @@
 // often show the same one. Used by every reconstruction that keeps the nearest.
 #pragma once
 
+#include <core/ambient_visibility.h>
+#include <core/light_visibility.h>
 #include <reconstruct/depth_tile.h>
 #include <reconstruct/reconstruction.h>
 
+#include <array>
 #include <bit>
 
 namespace stipple {
 
+// Light on a sample that stands for several places: the mean of what reaches them.
+class LightOnPlaces : public LightVisibility, public AmbientVisibility {
+public:
+    static constexpr int kMost = 16;
+    struct Place {
+        Vec3 position_camera;
+        float share;  // of all
+    };
+    LightOnPlaces(const LightVisibility* lights, const AmbientVisibility* ambient)
+        : lights_(lights), ambient_(ambient) {}
+
+    void set(const Place* places, int count) { places_ = places, count_ = count; }
+    float ofSun(size_t sun, const SurfaceSample& sample) const override;
+    float ofLamp(size_t lamp, const SurfaceSample& sample) const override;
+    float of(const SurfaceSample& sample, const Vec3& normal_world) const override;
+
+private:
+    template <class Of>
+    float mean(const SurfaceSample& sample, const Of& of) const;
+
+    const LightVisibility* lights_;
+    const AmbientVisibility* ambient_;
+    const Place* places_ = nullptr;
+    int count_ = 0;
+};
+
 class SubpixelShader {
 public:
-    explicit SubpixelShader(const ReconstructionContext& context) : context_(context) {}
+    explicit SubpixelShader(const ReconstructionContext& context)
+        : context_(context), light_(context.light_visibility, context.ambient_visibility) {
+        forget();
+    }
 
     // Numbers mean something else in another tile.
-    void forget() { last_number_ = varied_number_ = kNoNumber; }
+    void forget() {
+        last_number_ = kNoNumber;
+        varied_numbers_.fill(kNoNumber);
+    }
     // Surface and radiance of a key that is not empty, seen at the centre of subpixel (x, y).
     void show(const SampleLookup& lookup, uint64_t key, int x, int y);
     // Calls take(x, y, key) for all subpixels of pixel (px, py) after surface and radiance have
     // been set, where the key is not empty: once for all that show the same point or triangle, seen
-    // in their middle, within cells of kSharedCells^2 subpixels; where shadows, occlusion or
-    // pictures may fall between them, within cells half as wide, and no wider than half a pixel.
+    // in their middle, within cells of kSharedCells^2 subpixels. Shadows and occlusion may fall
+    // between them: they are asked for in cells half as wide, and no wider than half a pixel. There
+    // all is, where there are projectors' pictures.
     // Once for each where the normal varies: what is mirrored does not average as normals do.
     template <class Take>
     void showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
@@ -54,12 +90,17 @@ private:
     uint32_t membersBeside(const Cell& cell, uint32_t members) const;
     // Whether light may fall between members.
     bool hasVariedLight() const;
+    // The middle of members of one plane: in the picture, and in camera space.
+    Vec3 middleOf(const Cell& cell, uint32_t members, Vec2& p_sub) const;
     // Surface and radiance in the middle of some members of a cell. False where their normals vary.
     bool showMembers(const SampleLookup& lookup, const Cell& cell, uint32_t members);
 
     const ReconstructionContext& context_;
+    LightOnPlaces light_;
     uint32_t last_number_ = kNoNumber;
-    uint32_t varied_number_ = kNoNumber;  // the last triangle whose normal was found to vary
+    // Triangles whose normals were found to vary, each at its number modulo kVaried.
+    static constexpr uint32_t kVaried = 1024;
+    std::array<uint32_t, kVaried> varied_numbers_;
     SurfaceSample sample_;
     Vec3 radiance_ = Vec3(0);
 };
@@ -105,7 +146,7 @@ void SubpixelShader::showCell(const SampleLookup& lookup, const Cell& cell, cons
         uint32_t members = 0;
         for (int i = first; i < cell.count; ++i) members |= uint32_t(cell.number[i] == number) << i;
         if (number != kNoNumber) {
-            if (hasVariedLight()) members = membersBeside(cell, members);
+            if (!context_.lighting->projectors.empty()) members = membersBeside(cell, members);
             if (!showMembers(lookup, cell, members)) {
                 members = uint32_t(1) << first;
                 show(lookup, cell.key[first], cell.x[first], cell.y[first]);
