@@ -3,6 +3,7 @@
 
 #include <core/option_text.h>
 #include <core/stopwatch.h>
+#include <sampling/cover_grid.h>
 #include <scenegraph/surfel_finish.h>
 #include <scenegraph/visible_area.h>
 
@@ -27,6 +28,8 @@ void applyOption(PointBlockOptions& options, const std::string& key, const std::
         options.scored = switchOption(key, value);
     } else if (key == "partial") {
         options.partial = switchOption(key, value);
+    } else if (key == "complete") {
+        options.complete = switchOption(key, value);
     } else if (key == "directions") {
         if (value != "6" && value != "32" && value != "128") refuseOption(key, value, "6|32|128");
         options.directions = std::stoi(value);
@@ -34,7 +37,7 @@ void applyOption(PointBlockOptions& options, const std::string& key, const std::
         throw Error(ErrorCode::kInvalidArgument, "--set",
                     "unknown option '" + key +
                         "' of point-blocks (resolution, tolerance_angle, block_size, lattice, "
-                        "scored, partial, directions)");
+                        "scored, partial, complete, directions)");
     }
 }
 
@@ -42,6 +45,7 @@ namespace {
 
 constexpr float kEyeDistance = 20.0f;    // of orthographic rays, in radii: footprints hardly grow
 constexpr float kDepthTolerance = 2.0f;  // pixels: what lies no deeper is the same surface
+constexpr float kDiscReach = 0.625f;     // pixels: radius of what a sample makes up for
 constexpr int kRotations = 4, kShifts = 4, kTests = kRotations * kShifts;
 
 struct Sample {
@@ -147,7 +151,7 @@ public:
         std::vector<std::vector<uint32_t>> block_begin(seen.size());
         for (int d = 0; d < n; ++d) {
             sampleView(projectionOf(d, n), pixel, seen[size_t(d)], block_begin[size_t(d)]);
-            progress(0.4 * double(d + 1) / n);
+            progress(0.3 * double(d + 1) / n);
         }
         std::vector<Sample> chosen;
         const float adequate = float(std::cos(radians(options_.tolerance_angle)));
@@ -158,12 +162,14 @@ public:
             for (int d = 0; d < n; ++d) {
                 choose(projectionOf(d, n), pixel, seen[size_t(d)], block_begin[size_t(d)], least,
                        chosen);
-                progress(0.4 + 0.35 * (double(d + 1) / n + round) / rounds);
+                progress(0.3 + 0.25 * (double(d + 1) / n + round) / rounds);
             }
         }
         seen.clear();
         report.samples_chosen = std::max(report.samples_chosen, uint64_t(chosen.size()));
         if (options_.partial) removeNeedless(pixel, chosen);
+        progress(0.75);
+        if (options_.complete) closeGaps(pixel, progress, chosen);
         progress(1.0);
         return chosen;
     }
@@ -218,6 +224,31 @@ private:
         if (cancel_.requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
     }
 
+    // Towards -to_viewer, from outside.
+    Ray rayThrough(const Vec3& p, const Vec3& to_viewer) const {
+        Ray ray;
+        ray.direction = -to_viewer;
+        ray.origin = p + to_viewer * (kEyeDistance * radius_ - glm::dot(p, to_viewer));
+        ray.t_min = (kEyeDistance - 1.01f) * radius_;
+        return ray;
+    }
+    void cast(const std::vector<Ray>& rays, float pixel, std::vector<RayHit>& hits) {
+        hits.resize(rays.size());
+        const float footprint = pixel * std::sqrt(2.0f) / (kEyeDistance * radius_);
+        caster_.cast(rays.data(), rays.size(), hits.data(), footprint);
+        rays_cast_ += rays.size();
+    }
+    Sample sampleOf(const Ray& ray, const RayHit& hit) const {
+        Sample s;
+        s.position = ray.origin + ray.direction * hit.t;
+        s.normal = hit.normal_world;
+        s.albedo = hit.albedo;
+        s.facing = std::abs(glm::dot(s.normal, ray.direction));
+        s.is_double_sided = materials_[hit.material].double_sided;
+        s.finish_key = finishKey(materials_, hit.material, hit.finish);
+        return s;
+    }
+
     // Rays on a lattice, towards -to_viewer.
     void sampleView(const Vec3& to_viewer, float pixel, std::vector<Sample>& samples,
                     std::vector<uint32_t>& block_begin) {
@@ -244,30 +275,16 @@ private:
                     const int i = column * b + k % b - half_u, j = int(row) * b + k / b - half_v;
                     const Vec2 q = u * float(i) + v * float(j);
                     if (glm::dot(q, q) > radius_ * radius_) continue;
-                    Ray ray;
-                    ray.direction = -to_viewer;
-                    ray.origin = object_from_view * Vec3(q, kEyeDistance * radius_);
-                    ray.t_min = (kEyeDistance - 1.01f) * radius_;
-                    rays.push_back(ray);
+                    rays.push_back(rayThrough(object_from_view * Vec3(q, 0.0f), to_viewer));
                 }
                 if (rays.empty()) continue;
-                hits.resize(rays.size());
-                const float footprint = pixel * std::sqrt(2.0f) / (kEyeDistance * radius_);
-                caster_.cast(rays.data(), rays.size(), hits.data(), footprint);
+                cast(rays, pixel, hits);
                 const size_t before = of_row[row].size();
                 for (size_t k = 0; k < rays.size(); ++k) {
                     if (!(hits[k].t < kInfinity)) continue;
-                    Sample s;
-                    s.position = rays[k].origin + rays[k].direction * hits[k].t;
-                    s.normal = hits[k].normal_world;
-                    s.albedo = hits[k].albedo;
-                    s.facing = std::abs(glm::dot(s.normal, to_viewer));
-                    s.is_double_sided = materials_[hits[k].material].double_sided;
-                    s.finish_key = finishKey(materials_, hits[k].material, hits[k].finish);
-                    of_row[row].push_back(s);
+                    of_row[row].push_back(sampleOf(rays[k], hits[k]));
                 }
                 if (of_row[row].size() > before) begin_of_row[row].push_back(uint32_t(before));
-                rays_cast_ += rays.size();
             }
         });
         for (size_t row = 0; row < of_row.size(); ++row) {
@@ -362,6 +379,63 @@ private:
             if (!is_removed[i]) chosen[kept++] = chosen[i];
         }
         chosen.resize(kept);
+    }
+
+    // More samples beside one that its projection sees at a slant, as close along the surface as
+    // others are.
+    void sampleBeside(const Sample& s, const Vec3& to_viewer, float pixel,
+                      std::vector<Sample>& samples) {
+        constexpr float kMostSteps = 8.0f;
+        const int steps = int(std::min(1.0f / std::max(s.facing, 1e-3f), kMostSteps));
+        const Vec3 across = s.normal - to_viewer * glm::dot(s.normal, to_viewer);
+        if (steps < 2 || !(glm::dot(across, across) > 0.0f)) return;
+        const Vec3 step = glm::normalize(across) * (pixel / float(steps));
+        std::vector<Ray> rays;
+        std::vector<RayHit> hits;
+        for (int i = 1; i < steps; ++i)
+            rays.push_back(rayThrough(s.position + step * float(i), to_viewer));
+        cast(rays, pixel, hits);
+        for (size_t k = 0; k < rays.size(); ++k) {
+            if (hits[k].t < kInfinity) samples.push_back(sampleOf(rays[k], hits[k]));
+        }
+    }
+
+    // Adds what is seen from anywhere and no disc of a sample covers: surfaces that face between
+    // the projections, and those that all projections see at a slant.
+    void closeGaps(float pixel, const std::function<void(double)>& progress,
+                   std::vector<Sample>& chosen) {
+        CoverGrid grid(kDiscReach * pixel);
+        for (const Sample& s : chosen) grid.add(s.position, s.normal);
+        std::vector<Sample> seen;
+        std::vector<uint32_t> ignored;
+        for (int d = 0; d < kMaskDirections; ++d) {
+            const Vec3 to_viewer = maskDirectionOf(d);
+            seen.clear(), ignored.clear();
+            sampleView(to_viewer, pixel, seen, ignored);
+            constexpr size_t kChunk = 1024;
+            std::vector<std::vector<Sample>> open((seen.size() + kChunk - 1) / kChunk);
+            pool_.forEach(open.size(), [&](size_t chunk, int) {
+                throwIfAsked();
+                const size_t end = std::min(seen.size(), (chunk + 1) * kChunk);
+                std::vector<Sample> near;
+                for (size_t i = chunk * kChunk; i < end; ++i) {
+                    near.assign(1, seen[i]);
+                    sampleBeside(seen[i], to_viewer, pixel, near);
+                    for (const Sample& s : near) {
+                        if (!grid.covers(s.position, s.normal)) open[chunk].push_back(s);
+                    }
+                }
+            });
+            for (const std::vector<Sample>& samples : open) {
+                for (const Sample& s : samples) {
+                    // By one that has just come, perhaps.
+                    if (grid.covers(s.position, s.normal)) continue;
+                    grid.add(s.position, s.normal);
+                    chosen.push_back(s);
+                }
+            }
+            progress(0.75 + 0.25 * double(d + 1) / kMaskDirections);
+        }
     }
 
     const RayCaster& caster_;

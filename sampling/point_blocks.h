@@ -22,6 +22,7 @@ struct PointBlockOptions {
     int block_size = 8;       // samples along a side of what is chosen or left as a whole
     bool scored = true;       // well-lit angles first; else whatever comes first
     bool partial = true;      // leave single samples out that others make up for
+    bool complete = true;     // add samples where no projection has left any near enough
     int directions = 32;      // of projections: 6 (axes), 32, or 128
 };
 

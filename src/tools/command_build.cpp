@@ -30,7 +30,7 @@ const HelpText kHelp = {
     "point-blocks: rays from 32 directions sample the surface, and as many samples are kept as "
     "leave no hole at unit magnification, where the model is `resolution` pixels wide. --set: "
     "resolution (256), tolerance_angle (25), lattice (triangles|squares), block_size (8), scored "
-    "(on|off), partial (on|off), directions (6|32|128). splats: of a point cloud, as few "
+    "(on|off), partial (on|off), complete (on|off), directions (6|32|128). splats: of a point cloud, as few "
     "ellipses, cut at creases, as cover all points within `tolerance` (0.1, per cent of the "
     "diagonal) and color_tolerance "
     "(0.15); neighbours (12), points (200000, taken on meshes), shape "

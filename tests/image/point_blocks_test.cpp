@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Point-block models beside rays through their sources: quality, no holes from anywhere, no tears
 // when magnified, every reconstruction, the same bits for any number of threads.
+#include <core/rng.h>
 #include <gtest/gtest.h>
 #include <render/build_model.h>
 #include <render/compare.h>
@@ -9,6 +10,7 @@
 #include <scenegraph/procedural/generators.h>
 #include <tests/image/model_views.h>
 
+#include <algorithm>
 #include <filesystem>
 
 namespace stipple {
@@ -113,6 +115,51 @@ TEST(PointBlocks, noTearsWhenMagnifiedAndAtTheEdgesOfAWideView) {
     const Image rays = draw(pair.source, camera, 256, Method::kRaycast, 9, pool, 1),
                 points = draw(pair.model, camera, 256, Method::kPoints, 1, pool, 1);
     EXPECT_LE(compareImages(points, rays, pool).holes->count, 20u);
+}
+
+// Share of random places of the surface that no disc of the finest level covers.
+double uncoveredShare(const Scene& source, bool complete, ThreadPool& pool) {
+    PointBlockOptions options;
+    options.resolution = 64;
+    options.directions = 6;  // much is seen at a slant
+    options.complete = complete;
+    PointBlockReport report;
+    const CancelFlag cancel;
+    const SurfelModel model = buildPointBlockModel(
+        source, options, pool, cancel, [](double) {}, report);
+    const SurfelLevel& level = model.levels[0];
+    std::vector<Surfel> surfels;
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i)
+            surfels.push_back(unpackSurfel(level, block, i));
+    }
+    const Mesh& mesh = source.meshes[0];
+    Rng rng{5};
+    constexpr int kPlaces = 2000;
+    int uncovered = 0;
+    for (int i = 0; i < kPlaces; ++i) {
+        const double area = rng.uniform(0.0, mesh.cumulative_area.back());
+        const size_t t = size_t(std::upper_bound(mesh.cumulative_area.begin(),
+                                                 mesh.cumulative_area.end(), area) -
+                                mesh.cumulative_area.begin()) -
+                         1;
+        const UVec3& corners = mesh.triangles[t];
+        const Vec3 p =
+            (mesh.positions[corners.x] + mesh.positions[corners.y] + mesh.positions[corners.z]) /
+            3.0f;
+        const float reach = 0.5f * kDiscSide * std::sqrt(2.0f) * level.spacing;
+        uncovered += std::none_of(surfels.begin(), surfels.end(), [&](const Surfel& s) {
+            return glm::length(p - s.position) <= reach;
+        });
+    }
+    return double(uncovered) / kPlaces;
+}
+
+TEST(PointBlocks, whatProjectionsSeeAtASlantIsCovered) {
+    ThreadPool pool(2);
+    const Scene source = sceneOf(torus(), pool);
+    EXPECT_GT(uncoveredShare(source, false, pool), 0.01);
+    EXPECT_LT(uncoveredShare(source, true, pool), 0.001);
 }
 
 TEST(PointBlocks, sameBitsForAnyThreadsBuiltAndDrawn) {
