@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sampling/surfel_points.h>
 
+#include <core/vector_clones.h>
 #include <sampling/point_list.h>
 #include <sampling/surfel_visibility.h>
 #include <scenegraph/object_id.h>
@@ -182,9 +183,8 @@ struct Warp {
     float z_near, z_far;
 };
 
-__attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default"))) void warpPoints(
-    const Warp& w, const uint32_t* __restrict packed, int count, uint32_t first_number,
-    PointBlock& out) {
+STIPPLE_VECTOR_CLONES void warpPoints(const Warp& w, const uint32_t* __restrict packed, int count,
+                                      uint32_t first_number, PointBlock& out) {
     // Plain locals and restricted pointers, or the compiler will not vectorize.
     const float xx = w.x.x, xy = w.x.y, xz = w.x.z, yx = w.y.x, yy = w.y.y, yz = w.y.z;
     const float zx = w.z.x, zy = w.z.y, zz = w.z.z, bx = w.base.x, by = w.base.y, bz = w.base.z;
