@@ -74,7 +74,7 @@ public:
             nodes[tasks[i].node] = parts[i][0];
             is_done[tasks[i].node] = true;
             nodes.insert(nodes.end(), parts[i].begin() + 1, parts[i].end());
-            parts[i] = {};
+            parts[i] = std::vector<GroupNode>();  // {} would keep the memory
         }
         for (size_t n = n_upper; n-- > 0;) {
             if (!is_done[n]) accumulate(nodes, nodes[n]);
@@ -199,16 +199,15 @@ CellKey cellKey(const Extent& extent, uint32_t index, const DVec3& origin, doubl
     return key;
 }
 
-// Instance i becomes instance order[i]; names go with them.
-void reorder(Group& group, std::vector<uint32_t> order, ThreadPool& pool) {
-    group.instances.permute(order, pool);
+// Instance i is what was instance order[i]: names go with them.
+void nameInOrder(Group& group, std::vector<uint32_t> order) {
     if (!group.listed_index.empty()) {
         for (uint32_t& index : order) index = group.listed_index[index];
     }
     group.listed_index = std::move(order);
 }
 
-void removeEmpty(Group& group, ThreadPool& pool) {
+void removeEmpty(Group& group) {
     const size_t n = group.instances.size();
     std::vector<uint32_t> order;
     for (uint32_t i = 0; i < n; ++i) {
@@ -217,7 +216,8 @@ void removeEmpty(Group& group, ThreadPool& pool) {
             for (uint32_t k = 0; k < n; ++k) {
                 if (!group.instances.child(k).isNone()) order.push_back(k);
             }
-            reorder(group, std::move(order), pool);
+            group.instances.keep(order);
+            nameInOrder(group, std::move(order));
             return;
         }
     }
@@ -226,7 +226,7 @@ void removeEmpty(Group& group, ThreadPool& pool) {
 }  // namespace
 
 void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool& pool) {
-    removeEmpty(group, pool);
+    removeEmpty(group);
     const size_t n = group.instances.size();
     const size_t n_chunks = (n + kChunkInstances - 1) / kChunkInstances;
     const ChildTable children(scene, group);
@@ -269,11 +269,12 @@ void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool
         for (size_t i = begin; i < end; ++i)
             keys[i] = cellKey(extents[i], uint32_t(i), DVec3(centers.min), side);
     });
-    extents = {};
+    extents = std::vector<Extent>();
     parallelSort(pool, keys, std::less<CellKey>());
     std::vector<uint32_t> order(n);
     for (size_t i = 0; i < n; ++i) order[i] = keys[i].index;
-    reorder(group, std::move(order), pool);
+    group.instances.permute(order);
+    nameInOrder(group, std::move(order));
     for (const uint32_t index : group.listed_index)
         group.next_index = std::max(group.next_index, index + 1);
 

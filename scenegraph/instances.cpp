@@ -9,7 +9,6 @@ namespace {
 
 constexpr double kPositionSteps = 2147483647.0;  // int32 range on each side of the domain's centre
 
-constexpr size_t kChunkInstances = 65536;  // of loops over all instances
 
 // Decomposes m into scale * rotation (scale < 0: all axes mirrored). False if it is anything else.
 bool decomposeSimilarity(const DMat3& m, double& scale, glm::dquat& rotation) {
@@ -140,14 +139,27 @@ void InstanceStore::addChunks(ThreadPool& pool, size_t n_chunks,
     }
 }
 
-void InstanceStore::permute(const std::vector<uint32_t>& order, ThreadPool& pool) {
-    std::vector<Record> sorted(order.size());
-    pool.forEach((order.size() + kChunkInstances - 1) / kChunkInstances, [&](size_t chunk, int) {
-        const size_t begin = chunk * kChunkInstances,
-                     end = std::min(order.size(), begin + kChunkInstances);
-        for (size_t i = begin; i < end; ++i) sorted[i] = records_[order[i]];
-    });
-    records_ = std::move(sorted);
+void InstanceStore::permute(const std::vector<uint32_t>& order) {
+    // Cycle by cycle, in place: a copy of all records is what a large scene's load would need most
+    // memory for, where room was reserved for as many as have come.
+    records_.shrink_to_fit();
+    std::vector<bool> is_done(order.size(), false);
+    for (size_t first = 0; first < order.size(); ++first) {
+        if (is_done[first] || order[first] == first) continue;
+        const Record kept = records_[first];
+        size_t i = first;
+        for (; order[i] != first; i = order[i]) {
+            records_[i] = records_[order[i]];
+            is_done[i] = true;
+        }
+        records_[i] = kept;
+        is_done[i] = true;
+    }
+}
+
+void InstanceStore::keep(const std::vector<uint32_t>& order) {
+    for (size_t i = 0; i < order.size(); ++i) records_[i] = records_[order[i]];
+    records_.resize(order.size());
 }
 
 }  // namespace stipple

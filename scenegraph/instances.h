@@ -55,8 +55,10 @@ public:
     void erase(size_t i);
     void swap(size_t i, size_t j) { std::swap(records_[i], records_[j]); }
     void addEmpty(size_t n);
-    // Reorders: new record i is old record order[i]; those that order leaves out go.
-    void permute(const std::vector<uint32_t>& order, ThreadPool& pool);
+    // Reorders in place: new record i is old record order[i]. order: each once.
+    void permute(const std::vector<uint32_t>& order);
+    // Those that order, which ascends, leaves out go.
+    void keep(const std::vector<uint32_t>& order);
     size_t bytes() const {
         return records_.capacity() * sizeof(Record) + general_.capacity() * sizeof(Affine);
     }

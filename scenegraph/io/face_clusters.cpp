@@ -245,7 +245,7 @@ private:
                                     [&](const Neighbour& back) { return back.to == b; }));
             connect(a, n.to, n.length);
         }
-        neighbours_[b] = {};
+        neighbours_[b] = std::vector<Neighbour>();  // {} would keep the memory
         for (const Neighbour& n : neighbours_[a]) push(a, n, is_first);
     }
 

@@ -66,7 +66,7 @@ void PointIndex::fill(uint32_t node, std::vector<Item>&& items) {
     std::vector<Item> left, right;
     for (const Item& item : items)
         (item.position[axis] < made.split ? left : right).push_back(item);
-    items = {};
+    items = std::vector<Item>();  // {} would keep the memory
     made.left = newNode();
     made.right = newNode();
     const uint32_t below = made.left, above = made.right;

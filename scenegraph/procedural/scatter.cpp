@@ -355,7 +355,7 @@ void scatter(const ScatterParams& params, const ScatterSurface& surface, ThreadP
     std::vector<Place> places;
     for (std::vector<Place>& some : found) {
         places.insert(places.end(), some.begin(), some.end());
-        some = {};
+        some = std::vector<Place>();  // {} would keep the memory
     }
     places = keepDistance(std::move(places), params.spacing, params.count);
     instances.addChunks(pool, (places.size() + kChunkCells - 1) / kChunkCells,
