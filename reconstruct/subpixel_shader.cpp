@@ -3,6 +3,8 @@
 
 #include <reconstruct/shade.h>
 
+#include <cmath>
+
 namespace stipple {
 
 template <class Of>
@@ -13,6 +15,7 @@ float LightOnPlaces::mean(const SurfaceSample& sample, const Of& of) const {
     for (int i = 0; i < count_; ++i) {
         at.position_camera = places_[i].position_camera;
         at.depth = at.position_camera.z;
+        at.extent = sample.extent * std::sqrt(places_[i].share);
         sum += of(at) * places_[i].share;
     }
     return sum;

@@ -81,6 +81,21 @@ STIPPLE_VECTOR_CLONES void lookUp(const OcclusionProbes& probes, const Query& q,
     }
 }
 
+// A ray that is not stopped counts as far as it is known.
+void addRays(const OcclusionProbes& probes, const Query& q, int& open, int& closed) {
+    alignas(64) std::array<int32_t, OcclusionProbes::kCount> outcome;
+    lookUp(probes, q, outcome.data());
+    for (int r = 0; r < OcclusionProbes::kRays; ++r) {
+        int known = 0, hits = 0;
+        for (int i = r; i < OcclusionProbes::kCount; i += OcclusionProbes::kRays) {
+            known += outcome[size_t(i)] & kOpen;
+            hits |= outcome[size_t(i)] & kHit;
+        }
+        open += hits ? 0 : known;
+        closed += hits ? OcclusionProbes::kSteps : 0;
+    }
+}
+
 }  // namespace
 
 ScreenOcclusion::ScreenOcclusion(const View& view, FirstLook look, double radius)
@@ -116,8 +131,6 @@ ScreenOcclusion::ScreenOcclusion(const View& view, FirstLook look, double radius
 
 float ScreenOcclusion::of(const SurfaceSample& sample, const Vec3& normal_world) const {
     const Vec3& p = sample.position_camera;
-    const Vec2 sub = view_.project(p);
-    const int px = int(sub.x) & (kPatternSide - 1), py = int(sub.y) & (kPatternSide - 1);
     const View& look = look_.view;
     Query q;
     q.p = p;
@@ -137,18 +150,19 @@ float ScreenOcclusion::of(const SurfaceSample& sample, const Vec3& normal_world)
     q.width = float(look.width), q.height = float(look.height);
     q.is_orthographic = look.orthographic ? 1.0f : 0.0f;
     q.depth = look_.depth.data();
-    alignas(64) std::array<int32_t, OcclusionProbes::kCount> outcome;
-    lookUp(patterns_[size_t(py * kPatternSide + px)], q, outcome.data());
-    // A ray that is not stopped counts as far as it is known.
+    // A pixel has all patterns at least once, shared among its samples by their extents.
+    const float per_subpixel = std::max(float(kPatternSide) / float(view_.subpixels), 1.0f);
+    const Vec2 at = view_.project(p) * per_subpixel;
+    const int side = std::clamp(int(std::lround(sample.extent * per_subpixel)), 1, kPatternSide);
+    const int left = int(std::floor(at.x - 0.5f * float(side) + 0.5f)),
+              top = int(std::floor(at.y - 0.5f * float(side) + 0.5f));
     int open = 0, closed = 0;
-    for (int r = 0; r < OcclusionProbes::kRays; ++r) {
-        int known = 0, hits = 0;
-        for (int i = r; i < OcclusionProbes::kCount; i += OcclusionProbes::kRays) {
-            known += outcome[size_t(i)] & kOpen;
-            hits |= outcome[size_t(i)] & kHit;
+    for (int y = top; y < top + side; ++y) {
+        for (int x = left; x < left + side; ++x) {
+            addRays(patterns_[size_t((y & (kPatternSide - 1)) * kPatternSide +
+                                     (x & (kPatternSide - 1)))],
+                    q, open, closed);
         }
-        open += hits ? 0 : known;
-        closed += hits ? OcclusionProbes::kSteps : 0;
     }
     return closed > 0 ? float(open) / float(open + closed) : 1.0f;
 }

@@ -27,7 +27,7 @@ public:
     float of(const SurfaceSample& sample, const Vec3& normal_world) const override;
 
 private:
-    static constexpr int kPatternSide = 8;  // subpixels: neighbours look into other directions
+    static constexpr int kPatternSide = 8;  // of patterns along a pixel: each looks elsewhere
 
     View view_;
     FirstLook look_;

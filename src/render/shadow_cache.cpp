@@ -37,7 +37,7 @@ bool mayShow(const PageKey& key, const LightSpace& light, const DBox3& box) {
 RenderSettings shadowSettings(const RenderSettings& settings) {
     RenderSettings drawn = settings;
     drawn.subpixels = 1;
-    drawn.samples = 1.0;
+    drawn.samples = 2.0;  // a hole in a page is light within a shadow, for as long as it is kept
     drawn.tile_size = kPageTexels;
     drawn.splat_world = 0.0;
     drawn.visible_size = 0.0;  // the same lists as the camera's, and no loss of depth
