@@ -9,7 +9,6 @@ namespace {
 
 constexpr double kPositionSteps = 2147483647.0;  // int32 range on each side of the domain's centre
 
-
 // Decomposes m into scale * rotation (scale < 0: all axes mirrored). False if it is anything else.
 bool decomposeSimilarity(const DMat3& m, double& scale, glm::dquat& rotation) {
     const double a = glm::dot(m[0], m[0]), b = glm::dot(m[1], m[1]), c = glm::dot(m[2], m[2]);

@@ -39,7 +39,8 @@ std::vector<Variant> sizeVariants() {
     const auto add = [&](const std::string& what, const std::string& key,
                          const std::vector<std::string>& values, bool as_thesis,
                          std::vector<std::pair<std::string, std::string>> set) {
-        if (as_thesis) set.insert(set.end(), {{"scored", "off"}, {"partial", "off"}, {"complete", "off"}});
+        if (as_thesis)
+            set.insert(set.end(), {{"scored", "off"}, {"partial", "off"}, {"complete", "off"}});
         for (const std::string& value : values) {
             variants.push_back({what + (as_thesis ? ", as the thesis" : ""), value, set});
             variants.back().set.emplace_back(key, value);
