@@ -38,7 +38,7 @@ struct FrameStats {
     double overestimation = 0.0;   // points_drawn / points_kept; 0 without points
     uint64_t look_points = 0;      // drawn for the first look (shadow maps, ambient occlusion)
     uint64_t shadow_points = 0;    // drawn into shadow maps
-    size_t shadow_bytes = 0;       // of shadow maps
+    size_t shadow_bytes = 0;       // of shadow maps, kept ones included
     size_t cache_bytes = 0;        // of the point lists
     std::string debug_text;        // one line on the pixel asked for
 };
