@@ -101,7 +101,7 @@ private:
               p.y < float(wanted_.y1)))
             return;
         const uint8_t code = block.width[i];
-        const bool is_wide = means_.split().isWide(code);
+        const bool is_wide = means_.split().isWide(block, i);
         int x0 = int(p.x), y0 = int(p.y), side = 1;
         if (!is_wide) {
             // As DepthPass has it.

@@ -103,7 +103,7 @@ public:
         const SplitPass::Taken taken = split_.take(block, hits_, hits_);
         bool is_used = taken.is_used;
         for (int i = 0; taken.wide > 0 && i < block.count; ++i) {
-            if (block.keep[i] && split_.isWide(block.width[i])) is_used |= drawDisc(block, i);
+            if (block.keep[i] && split_.isWide(block, i)) is_used |= drawDisc(block, i);
         }
         return is_used;
     }
@@ -179,7 +179,9 @@ private:
     }
 
     void gather(const PointBlock& block, int i) {
-        const uint8_t code = block.width[i];
+        // Coarse discs are a surface's.
+        const uint8_t code =
+            block.is_coarse ? std::max(block.width[i], kSurfaceCode) : block.width[i];
         SurfaceSample sample;
         bool is_looked_up = false;
         const auto add = [&](int x, int y, const Vec2& p, float weight, float area) {
@@ -195,7 +197,7 @@ private:
             sum.weight += weight;
             sum.area += area;
         };
-        if (!split_.isWide(code)) {
+        if (!split_.isWide(block, i)) {
             const Vec2 p = context_.view.project(position(block, i));
             if (!(p.x >= float(inner_.x0) && p.x < float(inner_.x1) && p.y >= float(inner_.y0) &&
                   p.y < float(inner_.y1)))

@@ -32,7 +32,9 @@ public:
         patch_pass_.begin(inner);
         wide_pass_.begin(inner);
     }
-    bool isWide(uint8_t width_code) const { return is_wide_[width_code]; }
+    bool isWide(const PointBlock& block, int i) const {
+        return block.is_coarse || is_wide_[block.width[i]];
+    }
     struct Taken {
         int wide;      // points of the block on large surfaces
         bool is_used;  // some point is in front
@@ -41,7 +43,7 @@ public:
     Taken take(const PointBlock& block, DepthTile& patches, DepthTile& surfaces) {
         int wide = 0;
         bool is_used = false;
-        for (int i = 0; i < block.count; ++i) wide += is_wide_[block.width[i]];
+        for (int i = 0; i < block.count; ++i) wide += isWide(block, i);
         if (wide == 0) {
             is_used = patch_pass_.take(block, patches);
         } else if (wide == block.count) {

@@ -88,7 +88,6 @@ struct SurfelPoints::Placed {
     int level_index = 0;
     float length_scale = 1.0f;
     std::array<int, 256> width_codes = {};  // of finishes, in metres of camera space
-    bool blends_coarse = false;             // surfels coarser than the view asks for, by ewa
     ModelEye eye;
 };
 
@@ -114,6 +113,7 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         view.orthographic
             ? scaled_focal
             : scaled_focal / nearest * stretch(view, middle, std::max(middle.z, nearest));
+    // Subpixels between points: each covers 1/K of one.
     const float wanted = 1.0f / float(std::sqrt(context_.settings.samples));
     const int n_levels = int(model.levels.size());
     if (!mesh.triangles.empty() && model.levels.back().spacing * per_metre < kFarShare * wanted)
@@ -122,16 +122,8 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     while (l > 0 && model.levels[size_t(l)].spacing * per_metre > wanted) --l;
     const SurfelLevel& level = model.levels[size_t(l)];
     const bool may_be_discs = !context_.sink->wantsSurfels();
-    const float most = std::max(1.0f, wanted);  // subpixels between points without holes
-    Placed placed{frame,
-                  model,
-                  level,
-                  mesh_index,
-                  l,
-                  scale,
-                  {},
-                  !may_be_discs && level.spacing * per_metre > wanted,
-                  makeModelEye(frame, model, view.orthographic)};
+    Placed placed{frame, model, level, mesh_index,
+                  l,     scale, {},    makeModelEye(frame, model, view.orthographic)};
     for (size_t i = 0; i < model.finishes.size(); ++i) {
         placed.width_codes[i] =
             int(patchWidthCode(model.finishes[i].patch_width * scale, kFirstMetreExponent));
@@ -147,7 +139,7 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         const float z = std::max(center.z - radius, view.near_z);
         const float per_metre_here =
             scaled_focal * (view.orthographic ? 1.0f : stretch(view, center, z) / z);
-        const bool with_discs = may_be_discs && sides.largest * per_metre_here > most;
+        const bool with_discs = may_be_discs && sides.largest * per_metre_here > wanted;
         // Discs seen edge on cover no subpixel: their middles do.
         const bool with_points = !with_discs || sides.smallest * per_metre_here < kFewSubpixels;
         if (with_discs || !may_be_discs) radius += model.discSide() * sides.longest * reach;
@@ -156,6 +148,7 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         if (!rect.overlaps(region)) continue;
         if (context_.sink->hides(rect, std::max(center.z - radius, view.near_z), false)) continue;
         if (with_discs) drawDiscs(placed, block);
+        block_.is_coarse = !may_be_discs && level.spacing * per_metre_here > wanted;
         if (with_points) drawPoints(placed, block);
     }
     return true;
@@ -245,7 +238,7 @@ void SurfelPoints::addWidths(const Placed& placed, const SurfelBlock& b) {
     // Where there are one to two of a grid's samples a subpixel, on wider patches than those whose
     // holes are closed they would widen silhouettes.
     const int widest =
-        placed.model.leaves_no_holes || placed.blends_coarse ? kWidthCodes - 1 : int(kSurfaceCode);
+        placed.model.leaves_no_holes || block_.is_coarse ? kWidthCodes - 1 : int(kSurfaceCode);
     for (int i = 0; i < block_.count; ++i) {
         const int code =
             placed.width_codes[placed.level.albedo_finish[b.first + uint32_t(i)] >> 24];
@@ -357,7 +350,11 @@ void surfelAttributes(const Scene& scene, const Mat3& world_from_camera, const R
     sample.albedo = unpackSrgb8(bits & 0xffffffu);
     sample.alpha = 1.0f;
     sample.finish = plainFinish(scene.materials[sample.material]);
-    sample.patch_width = mesh.surfels->finishes[finish].patch_width * run.length_scale;
+    // What lies within a disc is told apart no more.
+    const float side =
+        level.spacing * (level.radius.empty() ? 1.0f : surfelRadius(level.radius[index]));
+    sample.patch_width =
+        std::max(mesh.surfels->finishes[finish].patch_width, side) * run.length_scale;
     sample.object = objectId(run.path);
     sample.normal_world = glm::normalize(
         world_from_camera * (run.camera_from_normal * unpackNormal16(level.normal[index])));

@@ -117,6 +117,9 @@ struct PointBlock {
     alignas(64) float normal_z[kBlockPoints + kBlockPadding];
     alignas(64) float area[kBlockPoints + kBlockPadding];
     bool is_prebuilt = false;  // areas are those of discs that close the surface, however dense
+    // Prebuilt and fewer than the view asks for: for sinks that want surfels they are their discs,
+    // however narrow the patch.
+    bool is_coarse = false;
     // One a point, for sinks that want surfels; nullptr: all are circles.
     const DiscShape* shapes = nullptr;
 };

@@ -117,6 +117,57 @@ TEST(PointBlocks, noTearsWhenMagnifiedAndAtTheEdgesOfAWideView) {
     EXPECT_LE(compareImages(points, rays, pool).holes->count, 20u);
 }
 
+// A sample covers 1/K of a pixel: what is finer than a pixel may still be too coarse.
+TEST(PointBlocks, noHolesAtManySamplesAPixel) {
+    ThreadPool pool(2);
+    const Pair pair = makePair(torus(), 64, pool);
+    for (const double zoom : {0.6, 0.75, 0.9, 1.1}) {
+        const Camera camera = cameraTo(pair.source, maskDirectionOf(31), 64, 96, zoom);
+        const Image rays = draw(pair.source, camera, 96, Method::kRaycast, 16, pool, 1),
+                    points = draw(pair.model, camera, 96, Method::kPoints, 4, pool, 1);
+        EXPECT_LE(compareImages(points, rays, pool).holes->count, 2u) << zoom;
+        EXPECT_GE(compareImages(points, rays, pool).psnr, 30.0) << zoom;
+    }
+}
+
+// Patches as narrow as leaves are no surfaces whose holes are closed: discs must see to it.
+TEST(PointBlocks, aSurfaceOfSmallPatchesIsClosedByEwa) {
+    ThreadPool pool(2);
+    GeneratedMesh made = torus();
+    Mesh split = made.mesh;
+    split.positions.clear(), split.normals.clear(), split.uvs.clear(), split.tangents.clear();
+    for (UVec3& corners : split.triangles) {
+        for (int k = 0; k < 3; ++k) {
+            const uint32_t from = corners[k];
+            corners[k] = uint32_t(split.positions.size());
+            // By a hair apart.
+            const Vec3 normal = made.mesh.normals[from];
+            split.positions.push_back(made.mesh.positions[from] +
+                                      normal * (1e-5f * float(split.positions.size() % 7)));
+            split.normals.push_back(normal);
+        }
+    }
+    made.mesh = std::move(split);
+    const Pair pair = makePair(std::move(made), 64, pool);
+    const Camera camera = cameraTo(pair.source, maskDirectionOf(3), 64, 256, 4.0);
+    const Image rays = draw(pair.source, camera, 256, Method::kRaycast, 16, pool, 1),
+                ewa = draw(pair.model, camera, 256, Method::kPoints, 1, pool, 2, Reconstruct::kEwa);
+    EXPECT_LE(compareImages(ewa, rays, pool).holes->count, 20u);
+    EXPECT_GE(compareImages(ewa, rays, pool).psnr, 40.0);
+
+    // Nor do its discs cast shadows on each other.
+    FrameRequest r;
+    r.camera = camera;
+    r.settings.width = r.settings.height = 256;
+    r.settings.subpixels = 2;
+    r.settings.shadows = true;
+    const Image lit = Renderer(pair.model, pool).render(r).image;
+    r.settings.method = Method::kRaycast;
+    r.settings.samples = 16;
+    const Image lit_by_rays = Renderer(pair.source, pool).render(r).image;
+    EXPECT_GE(compareImages(lit, lit_by_rays, pool).psnr, 48.0);
+}
+
 // Share of random places of the surface that no disc of the finest level covers.
 double uncoveredShare(const Scene& source, bool complete, ThreadPool& pool) {
     PointBlockOptions options;
