@@ -249,6 +249,17 @@ std::string inQuotes(std::string_view text) {
     return result;
 }
 
+std::string nameHint(const std::string& name, const std::vector<std::string>& known) {
+    const std::string nearest = nearestName(name, known);
+    if (!nearest.empty()) return "; did you mean " + inQuotes(nearest) + "?";
+    constexpr size_t kFew = 8;
+    if (known.empty() || known.size() > kFew) return "";
+    std::string list = "; there is ";
+    for (size_t i = 0; i < known.size(); ++i)
+        list += (i == 0 ? "" : i + 1 == known.size() ? " and " : ", ") + inQuotes(known[i]);
+    return list;
+}
+
 struct JsonSchema::Impl {
     Json document;
     valijson::Schema schema;
@@ -284,10 +295,8 @@ std::optional<JsonSchema::Problem> JsonSchema::firstProblem(const Json& value) c
     if (text.find("could not be validated using 'properties'") != std::string::npos &&
         quote != std::string::npos) {
         const std::string key = text.substr(quote + 3, text.rfind('\'') - quote - 3);
-        problem.message = "unknown key " + inQuotes(key);
-        const std::string nearest =
-            nearestName(key, knownKeys(schemasAt(impl_->document, problem.path, value)));
-        if (!nearest.empty()) problem.message += "; did you mean " + inQuotes(nearest) + "?";
+        problem.message = "unknown key " + inQuotes(key) +
+                          nameHint(key, knownKeys(schemasAt(impl_->document, problem.path, value)));
         return problem;
     }
     const Json& culprit = *valueAt(value, problem.path);

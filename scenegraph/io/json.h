@@ -29,6 +29,9 @@ std::string gltfPath(const JsonPath& path);     // "meshes[0].primitives[1]"; "r
 // an error line.
 std::string oneLine(std::string_view text, size_t max_length = 120);
 std::string inQuotes(std::string_view text);  // the same, between double quotes
+// What to say of a name that is not among the known: "; did you mean "oak"?", or which these are if
+// they are few, or nothing.
+std::string nameHint(const std::string& name, const std::vector<std::string>& known);
 
 // A compiled JSON Schema (draft 7).
 class JsonSchema {

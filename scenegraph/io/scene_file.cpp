@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <scenegraph/io/scene_file.h>
 
-#include <core/nearest_name.h>
 #include <core/settings.h>
 #include <scenegraph/io/picture.h>
 #include <scenegraph/io/scene_reader.h>
@@ -273,9 +272,7 @@ ChildRef SceneReader::child(const std::string& child_name, const JsonPath& path)
     if (const auto it = children.find(child_name); it != children.end()) return it->second;
     std::vector<std::string> names;
     for (const auto& [known, unused] : children) names.push_back(known);
-    const std::string nearest = nearestName(child_name, names);
-    fail(path, "there is no asset or group " + inQuotes(child_name) +
-                   (nearest.empty() ? "" : "; did you mean " + inQuotes(nearest) + "?"));
+    fail(path, "there is no asset or group " + inQuotes(child_name) + nameHint(child_name, names));
 }
 
 std::filesystem::path SceneReader::file(const Json& value, const JsonPath& path) const {

@@ -62,15 +62,17 @@ Json editsOf(const Group& group, const std::unordered_map<uint32_t, std::string>
 void saveScene(const Scene& scene, const std::map<std::string, std::string>& assets,
                const std::string& path) {
     if (!scene.path.ends_with(".scene.json"))
-        refuse(scene.path, "only scene files (*.scene.json) can be saved");
+        refuse(scene.path, "only scene files (*.scene.json) can be saved; this is a model");
     if (!path.ends_with(".scene.json")) refuse(path, "a scene file's name ends in .scene.json");
     namespace fs = std::filesystem;
     std::error_code error;
     const fs::path parent = fs::path(path).parent_path();
     const fs::path folder = fs::canonical(parent.empty() ? fs::path(".") : parent, error);
     if (error || folder != folderOf(scene.path)) {
+        const fs::path name = fs::path(path).filename();
         refuse(path, "must be in the folder of " + oneLine(scene.path, 300) +
-                         ", as paths in it are relative");
+                         ", as paths in it are relative: " +
+                         oneLine((fs::path(scene.path).parent_path() / name).string(), 300));
     }
     Diagnostics diagnostics;
     const LoadOptions options;

@@ -43,9 +43,7 @@ const HelpText kHelp = {
      "stipple bench tree.glb --against raycast --width 320 --height 240 --reference-rays 256"}};
 
 void addOptions(CLI::App& app, CommandLine& line) {
-    app.add_option("SCENE", line.bench.scene_path, "*.scene.json, .gltf, .glb, .ply or .obj")
-        ->required()
-        ->group("Arguments");
+    app.add_option("SCENE", line.bench.scene_path, kSceneFiles)->required()->group("Arguments");
     app.add_option("--camera", line.cameras,
                    "a camera of the scene; repeatable (default: all of them)")
         ->type_name("NAME")

@@ -49,9 +49,7 @@ const HelpText kHelp = {
      "echo '{\"do\": \"remove\", \"object\": \"12\"}' | stipple edit my.scene.json --script -"}};
 
 void addOptions(CLI::App& app, EditOptions& options) {
-    app.add_option("SCENE", options.scene, "*.scene.json, .gltf, .glb, .ply or .obj")
-        ->required()
-        ->group("Arguments");
+    app.add_option("SCENE", options.scene, kSceneFiles)->required()->group("Arguments");
     app.add_option("--script", options.script, "the edits, one a line; - is standard input")
         ->required()
         ->type_name("EDITS.jsonl")

@@ -143,9 +143,7 @@ ExitCode runInfo(const std::vector<std::string>& arguments) {
     LoadOptions load_options;
     bool as_json = false;
     std::string export_path;
-    app.add_option("SCENE", path, "*.scene.json, .gltf, .glb, .ply or .obj")
-        ->required()
-        ->group("Arguments");
+    app.add_option("SCENE", path, kSceneFiles)->required()->group("Arguments");
     app.add_flag("--json", as_json, "print JSON");
     app.add_option("--export", export_path,
                    "write the scene as glTF too (.glb or .gltf): groups flattened, up to 10^7 "

@@ -12,6 +12,9 @@
 
 namespace stipple {
 
+// What the commands load.
+inline constexpr const char* kSceneFiles = "*.scene.json, .gltf, .glb, .ply, .obj or .stipple";
+
 // The parts of a command's help that its options do not tell.
 struct HelpText {
     std::string usage;                  // "stipple info SCENE [--json]"

@@ -55,9 +55,7 @@ const HelpText kHelp = {
      "stipple render tree.glb -o tree.exr --aov depth,normal --samples 4 --stats tree.json"}};
 
 void addOptions(CLI::App& app, RenderOptions& options) {
-    app.add_option("SCENE", options.scene, "*.scene.json, .gltf, .glb, .ply or .obj")
-        ->required()
-        ->group("Arguments");
+    app.add_option("SCENE", options.scene, kSceneFiles)->required()->group("Arguments");
     app.add_option(
            "-o,--output", options.output,
            "the picture: .png (sRGB, 8 bits) or .exr (linear floats); appears whole or not at all")

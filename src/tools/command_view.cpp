@@ -34,9 +34,7 @@ const HelpText kHelp = {"stipple view SCENE [options]",
                          "stipple view my.scene.json --camera aerial --save-as my-2.scene.json"}};
 
 void addOptions(CLI::App& app, ViewCommandLine& line) {
-    app.add_option("SCENE", line.scene, "*.scene.json, .gltf, .glb, .ply or .obj")
-        ->required()
-        ->group("Arguments");
+    app.add_option("SCENE", line.scene, kSceneFiles)->required()->group("Arguments");
     app.add_option("--camera", line.camera, "a camera of the scene (default: the first)")
         ->type_name("NAME")
         ->group("Window");

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tools/edit_script.h>
 
-#include <core/nearest_name.h>
 #include <scenegraph/io/instance_json.h>
 
 #include <charconv>
@@ -23,10 +22,10 @@ ChildRef namedChild(const std::string& name, const char* key, const Scene& scene
     if (found != scene.names.end()) return found->second;
     std::vector<std::string> names;
     for (const auto& [known, child] : scene.names) names.push_back(known);
-    const std::string nearest = nearestName(name, names);
-    fail(std::string("/") + key,
-         "there is no asset or group " + inQuotes(name) +
-             (nearest.empty() ? "" : "; did you mean " + inQuotes(nearest) + "?"));
+    const std::string hint =
+        names.empty() ? "; nothing of a model alone has a name: an \"asset\" line gives one"
+                      : nameHint(name, names);
+    fail(std::string("/") + key, "there is no asset or group " + inQuotes(name) + hint);
 }
 
 // The transform that the command's keys give.
@@ -38,11 +37,11 @@ Affine transformOf(const Json& command) {
     JsonInstance instance;
     if (!readInstance(source, instance)) {
         static const std::map<std::string, const char*> kExpected = {
-            {"translation", "three numbers (m)"},
-            {"rotation", "three numbers (degrees)"},
-            {"quaternion", "four numbers x, y, z, w"},
-            {"scale", "a number, or three"},
-            {"matrix", "16 numbers, column by column"}};
+            {"translation", "three numbers (m) up to 1e9"},
+            {"rotation", "three numbers (degrees) up to 1e6"},
+            {"quaternion", "four numbers x, y, z, w up to 1e6"},
+            {"scale", "a number up to 1e6, or three"},
+            {"matrix", "16 numbers up to 1e9, column by column"}};
         for (const char* key : kTransformKeys) {
             if (!source.contains(key)) continue;
             const Json alone = {{"child", ""}, {key, source[key]}};
@@ -86,6 +85,17 @@ std::vector<uint32_t> pathOf(const std::string& text) {
     }
 }
 
+// What an insert calls its instance; "" without "as".
+std::string newLabel(const Json& command, SceneEditor& editor, const EditMemory& memory) {
+    const std::string label = stringOf(command, "as", "");
+    if (!label.empty() && label[0] >= '0' && label[0] <= '9')
+        fail("/as", inQuotes(label) + " begins with a digit, as indices do");
+    const auto it = memory.labels.find(label);
+    if (it != memory.labels.end() && editor.contains(it->second))
+        fail("/as", "there is " + inQuotes(label) + " already");
+    return label;
+}
+
 // An instance: a label, a path from the root, or a group and an index.
 InstanceId objectOf(const Json& command, SceneEditor& editor, const EditMemory& memory) {
     if (command.contains("index")) {
@@ -122,10 +132,7 @@ void checkKeys(const Json& command, std::initializer_list<const char*> known) {
     names.push_back("do");
     for (const auto& [key, value] : command.items()) {
         if (std::find(names.begin(), names.end(), key) != names.end()) continue;
-        const std::string nearest = nearestName(key, names);
-        fail("/" + oneLine(key),
-             "has no meaning here" +
-                 (nearest.empty() ? std::string() : "; did you mean " + inQuotes(nearest) + "?"));
+        fail("/" + oneLine(key), "has no meaning here" + nameHint(key, names));
     }
 }
 
@@ -135,7 +142,7 @@ bool runEdit(const Json& command, SceneEditor& editor, EditMemory& memory, Insta
     if (what == "insert") {
         checkKeys(command, {"child", "group", "as", "translation", "rotation", "quaternion",
                             "scale", "matrix"});
-        const std::string label = stringOf(command, "as", "");
+        const std::string label = newLabel(command, editor, memory);
         const ChildRef child = namedChild(stringOf(command, "child"), "child", scene);
         edited = editor.insert(groupOf(command, scene), child, transformOf(command));
         if (!label.empty()) memory.labels[label] = edited;
@@ -212,9 +219,7 @@ Camera cameraOf(const Json& command, const Scene& scene) {
         if (const Camera* camera = scene.findCamera(name)) return *camera;
         std::vector<std::string> names;
         for (const Camera& camera : scene.cameras) names.push_back(camera.name);
-        const std::string nearest = nearestName(name, names);
-        fail("/name", "there is no camera " + inQuotes(name) +
-                          (nearest.empty() ? "" : "; did you mean " + inQuotes(nearest) + "?"));
+        fail("/name", "there is no camera " + inQuotes(name) + nameHint(name, names));
     }
     const auto vectorOf = [&](const char* key, DVec3 value) {
         if (command.contains(key) && !readNumbers(command[key], 3, kMaxInstanceLength, &value.x))

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The study file, and the standard study.
-#include <core/nearest_name.h>
 #include <core/rng.h>
 #include <scenegraph/io/json.h>
 #include <tools/study.h>
@@ -160,11 +159,8 @@ private:
     std::string column(const Json& json, const std::string& place) const {
         const std::string name = json.get<std::string>();
         const std::vector<std::string>& columns = studyColumns();
-        if (std::find(columns.begin(), columns.end(), name) == columns.end()) {
-            const std::string nearest = nearestName(name, columns);
-            fail(place, "there is no column " + inQuotes(name) +
-                            (nearest.empty() ? "" : "; did you mean " + inQuotes(nearest) + "?"));
-        }
+        if (std::find(columns.begin(), columns.end(), name) == columns.end())
+            fail(place, "there is no column " + inQuotes(name) + nameHint(name, columns));
         return name;
     }
 

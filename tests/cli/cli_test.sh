@@ -650,16 +650,24 @@ not json
 {"do": "render"}
 {"do": "save", "output": "/tmp/edit.scene.json"}
 [1]
+{"do": "insert", "child": "zebra"}
+{"do": "insert", "child": "ball", "as": "12"}
+{"do": "insert", "child": "ball", "scale": 1e30}
 {"do": "render", "output": "a.png"}
+{"do": "insert", "child": "ball", "as": "mine"}
+{"do": "insert", "child": "ball", "as": "mine"}
+{"do": "remove", "object": "mine"}
+{"do": "insert", "child": "ball", "as": "mine"}
 JSON
     expect_ok render edit.scene.json -o b.png "${small[@]}" --quiet
     "$stipple" edit edit.scene.json --script edits.jsonl "${small[@]}" --quiet >stdout.txt 2>stderr.txt
     [[ $? == 3 ]] || fail "exit code"
-    [[ $(wc -l <stderr.txt) == 12 ]] || fail "not a line for each error"
+    [[ $(wc -l <stderr.txt) == 16 ]] || fail "not a line for each error"
     for line in "line 1: /child: .*did you mean \"ball\"" "line 2: singular" "line 3: /translation: " "line 4: " \
         "line 5: there is no instance 7" "line 6: " "line 7: group \"all\" contains \"balls\"" \
-        "line 8: /objct: .*did you mean \"object\"" "line 9: /do: " "line 10: needs \"output\"" "line 11: .*folder" \
-        "line 12: "; do
+        "line 8: /objct: .*did you mean \"object\"" "line 9: /do: " "line 10: needs \"output\"" \
+        "line 11: .*folder of edit.scene.json.*: edit.scene.json$" "line 12: " "line 13: /child: .*; there is .*\"ball\"" \
+        "line 14: /as: .*digit" "line 15: /scale: .*up to 1e6" "line 18: /as: there is \"mine\" already"; do
         grep -qE "edits.jsonl: $line" stderr.txt || fail "no such error: $line"
     done
     cmp -s a.png b.png || fail "bad lines have changed something"
