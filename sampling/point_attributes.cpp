@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sampling/point_attributes.h>
 
+#include <core/image.h>
 #include <scenegraph/object_id.h>
 
 namespace stipple {

@@ -16,23 +16,6 @@
 
 namespace stipple {
 
-namespace {
-
-const std::array<float, 256>& srgbTable() {
-    static const std::array<float, 256> table = [] {
-        std::array<float, 256> t;
-        for (int i = 0; i < 256; ++i) t[i] = linearFromSrgb(float(i) / 255.0f);
-        return t;
-    }();
-    return table;
-}
-
-uint32_t to8(float linear) {
-    return uint32_t(srgbFromLinear(std::clamp(linear, 0.0f, 1.0f)) * 255.0f + 0.5f);
-}
-
-}  // namespace
-
 uint32_t packOctahedral(const Vec3& n) {
     const Vec2 p = octahedralOf(n);
     const auto q = [](float v) { return uint32_t(std::lround((v * 0.5f + 0.5f) * 65535.0f)); };
@@ -43,13 +26,6 @@ Vec3 unpackOctahedral(uint32_t packed) {
     constexpr float kStep = 2.0f / 65535.0f;
     return octahedralNormal(float(packed & 0xffff) * kStep - 1.0f,
                             float(packed >> 16) * kStep - 1.0f);
-}
-
-uint32_t packSrgb8(const Vec3& c) { return to8(c.x) | to8(c.y) << 8 | to8(c.z) << 16; }
-
-Vec3 unpackSrgb8(uint32_t p) {
-    const auto& table = srgbTable();
-    return Vec3(table[p & 255], table[p >> 8 & 255], table[p >> 16 & 255]);
 }
 
 uint32_t packPlace(Vec2 uv) {

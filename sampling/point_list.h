@@ -47,8 +47,6 @@ struct ListBlock {
 
 uint32_t packOctahedral(const Vec3& unit);
 Vec3 unpackOctahedral(uint32_t packed);
-uint32_t packSrgb8(const Vec3& linear);
-Vec3 unpackSrgb8(uint32_t packed);
 // Barycentrics, 16 bits each.
 uint32_t packPlace(Vec2 uv);
 Vec2 unpackPlace(uint32_t packed);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sampling/surfel_points.h>
 
+#include <core/image.h>
 #include <core/vector_clones.h>
 #include <sampling/point_list.h>
 #include <sampling/surfel_visibility.h>
+#include <scenegraph/disc_planes.h>
 #include <scenegraph/object_id.h>
 #include <scenegraph/surface_at.h>
 
@@ -246,6 +248,16 @@ void SurfelPoints::addWidths(const Placed& placed, const SurfelBlock& b) {
     }
 }
 
+// Surfels that all have the same radius have but shading normals.
+void SurfelPoints::unpackDiscs(const SurfelLevel& level, const SurfelBlock& b) {
+    for (uint32_t i = 0; i < b.count; ++i) {
+        surfels_[i] = unpackSurfel(level, b, b.first + i);
+        planes_[i] = surfels_[i].normal;
+    }
+    if (level.radius.empty())
+        discPlanes(level.spacing, surfels_.data(), int(b.count), planes_.data());
+}
+
 // Its normals, areas and shapes.
 void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
     const SurfelLevel& level = placed.level;
@@ -254,15 +266,18 @@ void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
     const Mat3 linear(placed.frame.camera_from_object.linear);
     PointBlock& out = block_;
     out.shapes = level.shapes.empty() ? nullptr : shapes_.data();
+    const bool are_discs = out.is_coarse || out.shapes;
+    if (are_discs) unpackDiscs(level, b);
     for (int i = 0; i < out.count; ++i) {
         const uint32_t k = b.first + uint32_t(i);
         const Vec3 normal =
-            glm::normalize(placed.frame.camera_from_normal * unpackNormal16(level.normal[k]));
+            glm::normalize(placed.frame.camera_from_normal *
+                           (are_discs ? planes_[size_t(i)] : unpackNormal16(level.normal[k])));
         out.normal_x[i] = normal.x, out.normal_y[i] = normal.y, out.normal_z[i] = normal.z;
         const float share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[k]);
         out.area[i] = side * side * share * share;
         if (out.shapes) {
-            const Surfel s = unpackSurfel(level, b, k);
+            const Surfel& s = surfels_[size_t(i)];
             const float radius = level.spacing * share * placed.model.discSide() / kSidePerRadius;
             float area = 1.0f;
             shapes_[size_t(i)] = shapeOf(s, radius, linear, area);
@@ -292,6 +307,7 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
     const View& view = context_.view;
     TriangleBlock& out = triangles_;
     std::array<Vec3, kMostDiscCorners> corners;
+    unpackDiscs(level, b);
     // Of a square two triangles, of a hexagon four, of one with cuts up to eight.
     const auto shiftOf = [&](uint32_t k) {
         return level.shapes.empty() ? 1 : level.shapes[k].n_cuts == 0 ? 2 : 3;
@@ -305,13 +321,14 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
         for (; k < b.first + b.count && shiftOf(k) == shift &&
                out.count + (1 << shift) <= kBlockPoints;
              ++k) {
-            const Surfel s = unpackSurfel(level, b, k);
+            Surfel& s = surfels_[k - b.first];
             const Vec3 center(to_camera.point(DVec3(s.position)));
-            const int n = discPolygon(
-                level, s, placed.model.discSide() * level.spacing * s.radius_share, corners);
             // Before the eye and with the front to it.
             const SurfelFinish& finish = placed.model.finishes[s.finish];
             bool is_in_front = !showsBack(placed.eye, finish.material, s.normal, s.position);
+            s.normal = planes_[k - b.first];
+            const int n = discPolygon(
+                level, s, placed.model.discSide() * level.spacing * s.radius_share, corners);
             for (int c = 0; c < n; ++c) {
                 corners[size_t(c)] = center + linear * corners[size_t(c)];
                 is_in_front = is_in_front && corners[size_t(c)].z > view.near_z;

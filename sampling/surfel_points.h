@@ -22,6 +22,7 @@ private:
     struct Placed;
 
     void drawPoints(const Placed& placed, const SurfelBlock& block);
+    void unpackDiscs(const SurfelLevel& level, const SurfelBlock& block);
     void addWidths(const Placed& placed, const SurfelBlock& block);
     void addShapes(const Placed& placed, const SurfelBlock& block);
     void drawDiscs(const Placed& placed, const SurfelBlock& block);
@@ -31,6 +32,9 @@ private:
     PointBlock block_;
     TriangleBlock triangles_;
     std::array<DiscShape, kBlockPoints> shapes_;
+    // Of a block whose discs are drawn; normals of the planes these lie in.
+    std::array<Surfel, kBlockSurfels> surfels_;
+    std::array<Vec3, kBlockSurfels> planes_;
 };
 
 // Attributes of a surfel of a run (Run::surfel_level).

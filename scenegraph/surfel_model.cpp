@@ -249,11 +249,7 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
             }
             level.position.push_back(position);
             level.normal.push_back(packNormal16(s.normal));
-            const auto to8 = [](float v) {
-                return uint32_t(srgbFromLinear(std::clamp(v, 0.0f, 1.0f)) * 255.0f + 0.5f);
-            };
-            level.albedo_finish.push_back(to8(s.albedo.x) | to8(s.albedo.y) << 8 |
-                                          to8(s.albedo.z) << 16 | uint32_t(s.finish) << 24);
+            level.albedo_finish.push_back(packSrgb8(s.albedo) | uint32_t(s.finish) << 24);
             if (discs != SurfelDiscs::kAlike)
                 level.radius.push_back(surfelRadiusCode(s.radius_share));
             if (discs == SurfelDiscs::kShapes) level.shapes.push_back(packShape(s, level.cuts));
@@ -272,8 +268,7 @@ Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t
         SurfelLevel::step(block) * Vec3(positionPart(q, 0), positionPart(q, 1), positionPart(q, 2));
     s.normal = unpackNormal16(level.normal[i]);
     const uint32_t bits = level.albedo_finish[i];
-    const auto from8 = [](uint32_t v) { return linearFromSrgb(float(v & 255) / 255.0f); };
-    s.albedo = Vec3(from8(bits), from8(bits >> 8), from8(bits >> 16));
+    s.albedo = unpackSrgb8(bits);
     s.finish = uint8_t(bits >> 24);
     s.radius_share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[i]);
     if (!level.shapes.empty()) unpackShape(level, i, s);

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -166,6 +167,22 @@ float linearFromSrgb(float srgb) {
     if (!(srgb > 0.0f)) return 0.0f;
     if (srgb >= 1.0f) return 1.0f;
     return srgb <= 0.04045f ? srgb / 12.92f : std::pow((srgb + 0.055f) / 1.055f, 2.4f);
+}
+
+uint32_t packSrgb8(const Vec3& linear) {
+    const auto to8 = [](float v) {
+        return uint32_t(srgbFromLinear(std::clamp(v, 0.0f, 1.0f)) * 255.0f + 0.5f);
+    };
+    return to8(linear.x) | to8(linear.y) << 8 | to8(linear.z) << 16;
+}
+
+Vec3 unpackSrgb8(uint32_t packed) {
+    static const std::array<float, 256> table = [] {
+        std::array<float, 256> t;
+        for (size_t i = 0; i < t.size(); ++i) t[i] = linearFromSrgb(float(i) / 255.0f);
+        return t;
+    }();
+    return Vec3(table[packed & 255], table[packed >> 8 & 255], table[packed >> 16 & 255]);
 }
 
 Image loadImage(const std::string& path) {

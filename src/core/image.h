@@ -38,6 +38,9 @@ struct Image {
 // sRGB transfer function, scalar, on [0, 1].
 float srgbFromLinear(float linear);
 float linearFromSrgb(float srgb);
+// Three colours in 8 bits each, sRGB-encoded, the first in the lowest.
+uint32_t packSrgb8(const Vec3& linear);
+Vec3 unpackSrgb8(uint32_t packed);
 
 // Reads any format OpenImageIO knows. 8-bit RGB(A) pictures are taken as sRGB and made linear;
 // float formats are linear already. Throws kFileNotFound or kParse.

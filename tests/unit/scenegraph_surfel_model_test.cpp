@@ -2,6 +2,7 @@
 // Prebuilt models: what is packed comes back, and files that are damaged in any way are refused.
 #include <core/rng.h>
 #include <gtest/gtest.h>
+#include <scenegraph/disc_planes.h>
 #include <scenegraph/io/surfel_file.h>
 
 #include <cstring>
@@ -65,6 +66,52 @@ TEST(SurfelModel, packedSurfelsComeBackWithinTheirSteps) {
 }
 
 // Nothing of a block may be seen from where its cone says so.
+// Points a spacing apart on a plane, or on a line in it, with one shading normal that is not its.
+std::vector<float> cosinesToPlane(const Vec3& plane, const Vec3& shading, int columns) {
+    Vec3 u, v;
+    tangents(plane, u, v);
+    std::vector<Surfel> surfels;
+    Rng rng{3};
+    for (int i = 0; i < 24 * columns; ++i) {
+        Surfel s;
+        s.position = u * (float(i / columns) + float(rng.uniform(-0.2, 0.2))) +
+                     v * (float(i % columns) + float(rng.uniform(-0.2, 0.2)));
+        s.normal = shading;
+        surfels.push_back(s);
+    }
+    const SurfelLevel level =
+        packSurfels(surfels, std::vector<SurfelFinish>(1), 1.0f, SurfelDiscs::kAlike);
+    std::vector<float> cosines;
+    std::array<Vec3, kBlockSurfels> normals;
+    for (const SurfelBlock& block : level.blocks) {
+        std::vector<Surfel> of_block;
+        for (uint32_t i = block.first; i < block.first + block.count; ++i)
+            of_block.push_back(unpackSurfel(level, block, i));
+        discPlanes(level.spacing, of_block.data(), int(block.count), normals.data());
+        for (uint32_t i = 0; i < block.count; ++i) {
+            EXPECT_NEAR(glm::length(normals[i]), 1.0f, 1e-4f);
+            cosines.push_back(glm::dot(normals[i], plane));
+        }
+    }
+    return cosines;
+}
+
+TEST(SurfelModel, discsLieInTheSurfaceWhateverItsShadingNormal) {
+    const Vec3 plane = glm::normalize(Vec3(0.3f, -0.5f, 0.8f));
+    Vec3 aside, unused;
+    tangents(plane, aside, unused);
+    for (const float tilt : {0.0f, 0.7f, 1.4f, -1.0f}) {
+        const Vec3 shading = plane * std::cos(tilt) + aside * std::sin(tilt);
+        const std::vector<float> of_plane = cosinesToPlane(plane, shading, 24);
+        const auto in_plane =
+            std::count_if(of_plane.begin(), of_plane.end(), [](float c) { return c > 0.999f; });
+        EXPECT_GT(in_plane, std::ptrdiff_t(of_plane.size()) * 95 / 100) << tilt;
+        // No more can be said of a line.
+        for (const float c : cosinesToPlane(plane, shading, 1))
+            EXPECT_NEAR(c, std::cos(tilt), 0.05f);
+    }
+}
+
 TEST(SurfelModel, conesHideWhatFacesAway) {
     const SurfelModel model = ballModel(SurfelDiscs::kAlike);
     Rng rng{3};
