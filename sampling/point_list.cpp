@@ -305,7 +305,9 @@ void PointLists::remakeDropped(ThreadPool& pool) {
     std::vector<Job> jobs;
     for (const auto& [name, block_count] : std::exchange(dropped_, {})) {
         Slot& slot = slotOf(name);
-        if (!(scene_.groups[name.child.index()].nodes[name.node].area > 0.0) || slot.list.load() ||
+        const std::vector<GroupNode>& nodes = scene_.groups[name.child.index()].nodes;
+        // A group that was built anew may have fewer.
+        if (name.node >= nodes.size() || !(nodes[name.node].area > 0.0) || slot.list.load() ||
             !hasLists(name.child) || !takeBudget(block_count * sizeof(ListBlock)))
             continue;
         auto list = std::make_unique<List>();

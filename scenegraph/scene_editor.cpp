@@ -4,6 +4,7 @@
 #include <scenegraph/group_build.h>
 #include <scenegraph/group_sums.h>
 
+#include <algorithm>
 #include <numeric>
 
 namespace stipple {
@@ -11,6 +12,7 @@ namespace stipple {
 namespace {
 
 constexpr uint32_t kFewInstances = 12;  // below a node that was built: merged
+constexpr double kFarthest = 1e30;      // m: boxes are of floats
 
 // For a copy: "tile~2".
 std::string freeName(const Scene& scene, const std::string& name) {
@@ -149,8 +151,42 @@ void SceneEditor::checkInsert(uint32_t group, ChildRef child, const Affine& tran
         if (reaches(child, group))
             refuse("group \"" + scene_.groups[child.index()].name + "\" contains \"" +
                    scene_.groups[group].name + "\" already");
-        if (scene_.groups[child.index()].depth + scene_.groups[scene_.root].depth > kDeepestNesting)
+        if (scene_.groups[child.index()].depth + 1 + depthAbove(group) > kDeepestNesting)
             refuse("groups would be nested more than " + std::to_string(kDeepestNesting) + " deep");
+    }
+    DVec3 center, half;
+    if (instanceBox(childSums(scene_, child), transform, center, half)) {
+        const DVec3 far = glm::abs(center) + half;
+        if (!(std::max({far.x, far.y, far.z}) < kFarthest))
+            refuse("what it places would reach beyond 1e30 m");
+    }
+}
+
+// Levels of groups that hold the group.
+int SceneEditor::depthAbove(uint32_t group) const {
+    std::vector<uint32_t> around = withHolders({group});
+    std::sort(around.begin(), around.end(), [&](uint32_t a, uint32_t b) {
+        return scene_.groups[a].depth < scene_.groups[b].depth;
+    });
+    std::map<uint32_t, int> above;
+    int most = 0;
+    for (const uint32_t g : around) {
+        most = std::max(most, above[g]);
+        for (const auto& [holder, count] : holders_[g])
+            above[holder] = std::max(above[holder], above[g] + 1);
+    }
+    return most;
+}
+
+// At least that deep; what holds it, deeper.
+void SceneEditor::deepen(uint32_t group, int depth) {
+    std::vector<std::pair<uint32_t, int>> open{{group, depth}};
+    while (!open.empty()) {
+        const auto [g, least] = open.back();
+        open.pop_back();
+        if (scene_.groups[g].depth >= least) continue;
+        scene_.groups[g].depth = least;
+        for (const auto& [holder, count] : holders_[g]) open.emplace_back(holder, least + 1);
     }
 }
 
@@ -179,9 +215,14 @@ void SceneEditor::remove(InstanceId id) {
 
 void SceneEditor::move(InstanceId id, const Affine& group_from_child) {
     const ChildRef what = child(id);
-    checkInsert(id.group, ChildRef::mesh(0), group_from_child);
+    checkInsert(id.group, what, group_from_child);
     take(id);
     place(id, what, group_from_child);
+}
+
+void SceneEditor::check(InstanceId id, ChildRef child, const Affine& group_from_child) {
+    slotOf(id);
+    checkInsert(id.group, child, group_from_child);
 }
 
 void SceneEditor::replace(InstanceId id, ChildRef child) {
@@ -213,8 +254,10 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
         markEdited(id);
     }
     const ChildSums as_child = group.as_child;
+    const int depth_before = group.depth;
     buildGroup(scene_, group, scene_.path + ": /groups/" + group.name, pool);
     group.as_child = as_child;
+    deepen(group_index, std::exchange(group.depth, depth_before));
     open_[group_index].reset();
     opened(group_index);
     rebuilt_.push_back(group_index);
@@ -223,7 +266,9 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
                  more_triangles = group.triangles_total - triangles_before;
     group.instances_total = instances_before, group.triangles_total = triangles_before;
     countInstances(group_index, more_instances, more_triangles);
-    groupChanged(group_index);
+    Dirty dirty;
+    groupChanged(group_index, dirty);
+    refresh(std::move(dirty));
     return first;
 }
 
@@ -333,8 +378,20 @@ void SceneEditor::markEdited(InstanceId id) {
     edited[id.index] = true;
 }
 
+void SceneEditor::addDirty(uint32_t group, uint32_t node, Dirty& dirty) const {
+    dirty[{scene_.groups[group].depth, group}].push_back(node);
+}
+
+void SceneEditor::refresh(Dirty dirty) {
+    while (!dirty.empty()) {
+        const auto group = dirty.extract(dirty.begin());
+        refreshNodes(group.key().second, group.mapped());
+        groupChanged(group.key().second, dirty);
+    }
+}
+
 // Lets the groups that instance it know.
-void SceneEditor::groupChanged(uint32_t index) {
+void SceneEditor::groupChanged(uint32_t index, Dirty& dirty) {
     Group& group = scene_.groups[index];
     const ChildSums now = {group.bounds, group.area, group.max_triangle_area};
     const Uses uses = uses_[index];
@@ -344,7 +401,7 @@ void SceneEditor::groupChanged(uint32_t index) {
         group.as_child = now;
         for (const InstanceId& use : uses.places) {
             const uint32_t slot = slotOf(use);
-            refreshUpwards(use.group, open_[use.group]->node_of[slot]);
+            addDirty(use.group, open_[use.group]->node_of[slot], dirty);
         }
     } else {
         const ChildSums& was = group.as_child;
@@ -358,35 +415,26 @@ void SceneEditor::groupChanged(uint32_t index) {
             return;
         }
         group.as_child = now;
-        const std::map<uint32_t, size_t> holders = holders_[index];
-        for (const auto& [holder, count] : holders) refreshAll(holder);
+        for (const auto& [holder, count] : holders_[index]) addDirty(holder, kGone, dirty);
     }
 }
 
-// All nodes anew, children before parents.
-void SceneEditor::refreshAll(uint32_t group_index) {
-    Group& group = scene_.groups[group_index];
-    std::vector<uint32_t> order{0};
-    for (size_t i = 0; i < order.size(); ++i) {
-        const GroupNode& node = group.nodes[order[i]];
-        for (uint32_t c = 0; c < node.child_count; ++c) order.push_back(node.first_child + c);
-    }
-    for (size_t i = order.size(); i-- > 1;) {
-        accumulateNode(
-            group, group.nodes, [&](ChildRef r) { return childSums(scene_, r); },
-            group.nodes[order[i]]);
-        note(group_index, order[i]);
-    }
-    opened(group_index);
-    refreshUpwards(group_index, 0);
-}
-
-// Numbers for people: in all groups above, too.
+// Numbers for people: in all groups above, too, from the innermost outwards.
 void SceneEditor::countInstances(uint32_t index, double instances, double triangles) {
-    scene_.groups[index].instances_total += instances;
-    scene_.groups[index].triangles_total += triangles;
-    for (const auto& [holder, count] : holders_[index])
-        countInstances(holder, instances * double(count), triangles * double(count));
+    std::map<std::pair<int, uint32_t>, std::pair<double, double>> more;
+    more[{scene_.groups[index].depth, index}] = {instances, triangles};
+    while (!more.empty()) {
+        const auto of_group = more.extract(more.begin());
+        const uint32_t g = of_group.key().second;
+        const auto [n_instances, n_triangles] = of_group.mapped();
+        scene_.groups[g].instances_total += n_instances;
+        scene_.groups[g].triangles_total += n_triangles;
+        for (const auto& [holder, count] : holders_[g]) {
+            auto& sum = more[{scene_.groups[holder].depth, holder}];
+            sum.first += n_instances * double(count);
+            sum.second += n_triangles * double(count);
+        }
+    }
 }
 
 SceneChanges SceneEditor::takeChanges() {

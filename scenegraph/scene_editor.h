@@ -71,6 +71,9 @@ public:
     InstanceId insertMany(uint32_t group, const std::vector<NewInstance>& instances,
                           ThreadPool& pool);
 
+    // Throws what replace() and move() would.
+    void check(InstanceId id, ChildRef child, const Affine& group_from_child);
+
     bool contains(InstanceId id);
     ChildRef child(InstanceId id);
     Affine groupFromChild(InstanceId id);
@@ -137,12 +140,20 @@ private:
     void split(uint32_t group, uint32_t node);
     void collapse(uint32_t group, uint32_t node);
     uint32_t rebuildIfTooDeep(uint32_t group, uint32_t leaf);
+    // Nodes whose sums are not up to date, by depth and group, so that what is within comes before
+    // what holds it, and each group is summed up once; kGone: all of the group's.
+    using Dirty = std::map<std::pair<int, uint32_t>, std::vector<uint32_t>>;
     void refreshUpwards(uint32_t group, uint32_t node);
-    void groupChanged(uint32_t group);
-    void refreshAll(uint32_t group);
+    void refresh(Dirty dirty);
+    void refreshNodes(uint32_t group, const std::vector<uint32_t>& nodes);
+    void groupChanged(uint32_t group, Dirty& dirty);
+    void addDirty(uint32_t group, uint32_t node, Dirty& dirty) const;
+    void deepen(uint32_t group, int depth);
+    int depthAbove(uint32_t group) const;
     void countInstances(uint32_t group, double instances, double triangles);
     void note(uint32_t group, uint32_t node);
     void noteBox(uint32_t group, const DBox3& box);
+    void noteBox(uint32_t group, const DBox3& box, int& steps);
     std::vector<uint32_t> withHolders(std::vector<uint32_t> groups) const;
     void markEdited(InstanceId id);
 

@@ -12,6 +12,7 @@ namespace {
 constexpr uint32_t kMostResidents = 32;  // of a leaf, before it is split
 constexpr size_t kMostChanges = 1 << 16;
 constexpr size_t kMostBoxes = 256;
+constexpr int kMostBoxSteps = 4096;  // from group to group
 
 uint32_t placesOf(const GroupNode& node) { return node.resident_count + node.free_count; }
 
@@ -22,6 +23,7 @@ uint32_t capacityFor(uint32_t count) { return std::bit_ceil(std::max(count, 4u))
 void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_child) {
     addUse(id, child);
     markEdited(id);
+    if (child.isGroup()) deepen(id.group, scene_.groups[child.index()].depth + 1);
     DVec3 center, half;
     if (instanceBox(childSums(scene_, child), group_from_child, center, half))
         noteBox(id.group, {center - half, center + half});
@@ -37,10 +39,6 @@ void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_
     countInstances(id.group, is_group ? scene_.groups[child.index()].instances_total : 1.0,
                    is_group ? scene_.groups[child.index()].triangles_total
                             : double(scene_.meshes[child.index()].triangles.size()));
-    if (is_group) {
-        int& depth = scene_.groups[id.group].depth;
-        depth = std::max(depth, scene_.groups[child.index()].depth + 1);
-    }
     refreshUpwards(id.group, changed);
 }
 
@@ -341,35 +339,64 @@ void SceneEditor::note(uint32_t group, uint32_t node) {
 
 // Of a box in a group: everywhere that the group is instanced.
 void SceneEditor::noteBox(uint32_t group, const DBox3& box) {
+    int steps = 0;
+    noteBox(group, box, steps);
+}
+
+void SceneEditor::noteBox(uint32_t group, const DBox3& box, int& steps) {
     if (changes_.anywhere) return;
     if (group == scene_.root) changes_.boxes.push_back(box);
     const Uses& uses = uses_[group];
-    if (uses.places.size() != uses.count || changes_.boxes.size() > kMostBoxes) {
+    if (uses.places.size() != uses.count || changes_.boxes.size() > kMostBoxes ||
+        ++steps > kMostBoxSteps) {
         changes_.anywhere = true;
         changes_.boxes.clear();
         return;
     }
     for (const InstanceId& use : uses.places)
-        noteBox(use.group, transformBox(groupFromChild(use), box));
+        noteBox(use.group, transformBox(groupFromChild(use), box), steps);
 }
 
-void SceneEditor::refreshUpwards(uint32_t group_index, uint32_t node_index) {
-    OpenGroup& open = *open_[group_index];
+void SceneEditor::refreshUpwards(uint32_t group, uint32_t node) {
+    Dirty dirty;
+    addDirty(group, node, dirty);
+    refresh(std::move(dirty));
+}
+
+// The nodes and those above them, children before parents.
+void SceneEditor::refreshNodes(uint32_t group_index, const std::vector<uint32_t>& nodes) {
+    const OpenGroup& open = opened(group_index);
     Group& group = scene_.groups[group_index];
-    for (;;) {
+    std::vector<std::pair<int, uint32_t>> order;  // levels below the root, node
+    if (std::find(nodes.begin(), nodes.end(), kGone) != nodes.end()) {
+        order = {{0, 0}};
+        for (size_t i = 0; i < order.size(); ++i) {
+            const auto [level, index] = order[i];
+            const GroupNode& node = group.nodes[index];
+            for (uint32_t c = 0; c < node.child_count; ++c)
+                order.emplace_back(level + 1, node.first_child + c);
+        }
+    } else {
+        for (const uint32_t node : nodes) {
+            int level = 0;
+            for (uint32_t n = node; n != 0; n = open.parent[n]) ++level;
+            for (uint32_t n = node; n != 0; n = open.parent[n]) order.emplace_back(level--, n);
+            order.emplace_back(0, 0);
+        }
+    }
+    std::sort(order.begin(), order.end(), std::greater<>());
+    order.erase(std::unique(order.begin(), order.end()), order.end());
+    for (const auto& [level, node] : order) {
         accumulateNode(
             group, group.nodes, [&](ChildRef r) { return childSums(scene_, r); },
-            group.nodes[node_index]);
-        note(group_index, node_index);
-        if (node_index == 0) break;
-        node_index = open.parent[node_index];
+            group.nodes[node]);
+        note(group_index, node);
     }
     const GroupNode& root = group.nodes[0];
     group.area = root.area;
     group.max_triangle_area = root.max_triangle_area;
     group.bounds =
         root.area > 0.0 ? DBox3{DVec3(root.bounds.min), DVec3(root.bounds.max)} : DBox3();
-    groupChanged(group_index);
 }
 
 }  // namespace stipple

@@ -91,7 +91,10 @@ void editGroup(SceneReader& reader, Group& group, const Json& edits, const JsonP
     if (const auto next = edits.find("next"); next != edits.end())
         group.next_index =
             std::max(group.next_index, readIndex(reader, *next, joined(path, {"next"})));
-    reader.context.budget.take(double(group.next_index) / 8.0, reader.where(path), "its edits");
+    // Whether it is edited; and, where it is edited further, where it is and was.
+    constexpr double kBytesAnIndex = 1.0 / 8.0 + 2.0 * sizeof(uint32_t);
+    reader.context.budget.take(double(group.next_index) * kBytesAnIndex, reader.where(path),
+                               "its edits");
     group.edited.assign(group.next_index, false);
     for (const uint32_t index : edited) group.edited[index] = true;
 }

@@ -96,6 +96,14 @@ std::string newLabel(const Json& command, SceneEditor& editor, const EditMemory&
     return label;
 }
 
+// Whether the path that names the object is to get copies of its own ("only_here").
+bool isOnlyHere(const Json& command, const EditMemory& memory) {
+    const Json only_here = command.value("only_here", Json(false));
+    if (!only_here.is_boolean()) fail("/only_here", "is neither true nor false");
+    return only_here.get<bool>() && !command.contains("index") &&
+           !memory.labels.contains(stringOf(command, "object"));
+}
+
 // An instance: a label, a path from the root, or a group and an index.
 InstanceId objectOf(const Json& command, SceneEditor& editor, const EditMemory& memory) {
     if (command.contains("index")) {
@@ -107,10 +115,13 @@ InstanceId objectOf(const Json& command, SceneEditor& editor, const EditMemory& 
     const std::string object = stringOf(command, "object");
     if (const auto label = memory.labels.find(object); label != memory.labels.end())
         return label->second;
-    const std::vector<uint32_t> path = pathOf(object);
-    const Json only_here = command.value("only_here", Json(false));
-    if (!only_here.is_boolean()) fail("/only_here", "is neither true nor false");
-    return only_here.get<bool>() ? editor.findOwn(path) : editor.find(path);
+    return editor.find(pathOf(object));
+}
+
+// The same, to be changed: once nothing can fail any more, as groups may be copied.
+InstanceId ownObject(const Json& command, SceneEditor& editor, const EditMemory& memory) {
+    return isOnlyHere(command, memory) ? editor.findOwn(pathOf(stringOf(command, "object")))
+                                       : objectOf(command, editor, memory);
 }
 
 using Key = std::pair<uint32_t, uint32_t>;
@@ -150,7 +161,7 @@ bool runEdit(const Json& command, SceneEditor& editor, EditMemory& memory, Insta
     }
     if (what == "remove") {
         checkKeys(command, {"object", "group", "index", "only_here"});
-        edited = objectOf(command, editor, memory);
+        edited = ownObject(command, editor, memory);
         const std::pair<ChildRef, Affine> was = {editor.child(edited),
                                                  editor.groupFromChild(edited)};
         editor.remove(edited);
@@ -162,19 +173,23 @@ bool runEdit(const Json& command, SceneEditor& editor, EditMemory& memory, Insta
                             "quaternion", "scale", "matrix"});
         if (!hasTransform(command)) fail("", "needs translation, rotation, scale or matrix");
         Affine transform = transformOf(command);
-        edited = objectOf(command, editor, memory);
+        const InstanceId moved = objectOf(command, editor, memory);
         // A place alone keeps the rest.
         const bool is_place_alone = command.contains("translation") &&
                                     !command.contains("rotation") &&
                                     !command.contains("quaternion") && !command.contains("scale");
-        if (is_place_alone) transform.linear = editor.groupFromChild(edited).linear;
+        if (is_place_alone) transform.linear = editor.groupFromChild(moved).linear;
+        editor.check(moved, editor.child(moved), transform);
+        edited = ownObject(command, editor, memory);
         editor.move(edited, transform);
         return true;
     }
     if (what == "replace") {
         checkKeys(command, {"object", "group", "index", "only_here", "child"});
         const ChildRef child = namedChild(stringOf(command, "child"), "child", scene);
-        edited = objectOf(command, editor, memory);
+        const InstanceId replaced = objectOf(command, editor, memory);
+        editor.check(replaced, child, editor.groupFromChild(replaced));
+        edited = ownObject(command, editor, memory);
         editor.replace(edited, child);
         return true;
     }

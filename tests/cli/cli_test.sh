@@ -658,11 +658,15 @@ not json
 {"do": "insert", "child": "ball", "as": "mine"}
 {"do": "remove", "object": "mine"}
 {"do": "insert", "child": "ball", "as": "mine"}
+{"do": "replace", "object": "1/12", "only_here": true, "child": "all"}
+{"do": "move", "object": "1/12", "only_here": true, "translation": [0, 0, 0], "scale": 1e6, "rotation": [1e9, 0, 0]}
+{"do": "save", "output": "unchanged.scene.json"}
 JSON
     expect_ok render edit.scene.json -o b.png "${small[@]}" --quiet
     "$stipple" edit edit.scene.json --script edits.jsonl "${small[@]}" --quiet >stdout.txt 2>stderr.txt
     [[ $? == 3 ]] || fail "exit code"
-    [[ $(wc -l <stderr.txt) == 16 ]] || fail "not a line for each error"
+    [[ $(wc -l <stderr.txt) == 18 ]] || fail "not a line for each error"
+    grep -q copy_of unchanged.scene.json && fail "an edit that was refused has copied a group"
     for line in "line 1: /child: .*did you mean \"ball\"" "line 2: singular" "line 3: /translation: " "line 4: " \
         "line 5: there is no instance 7" "line 6: " "line 7: group \"all\" contains \"balls\"" \
         "line 8: /objct: .*did you mean \"object\"" "line 9: /do: " "line 10: needs \"output\"" \
@@ -766,6 +770,8 @@ case_edit_file_errors() {
     expect_error 3 '/edits/balls/placed/0: ' info bad.scene.json
     with_edits '{ "balls": { "placed": [ { "index": 99999999999, "child": "ball" } ] } }'
     expect_error 3 '/edits/balls/placed/0/index: ' info bad.scene.json
+    with_edits '{ "balls": { "next": 4294967294 } }'
+    expect_error 1 'its edits need about 34.9 GB' info bad.scene.json --memory-limit 8000
     with_edits '{ "two": { "copy_of": "ball" } }'
     expect_error 3 '/edits/two/copy_of: ' info bad.scene.json
     with_edits '{ "ball": { "removed": [0] } }'

@@ -193,11 +193,13 @@ TEST(SceneEditor, whatCannotBeChangesNothing) {
     const Affine nowhere{DMat3(1.0), DVec3(std::nan(""))};
     EXPECT_THROW(editor.insert(0, ChildRef::mesh(0), flat), Error);
     EXPECT_THROW(editor.insert(0, ChildRef::mesh(0), nowhere), Error);
+    EXPECT_THROW(editor.insert(0, ChildRef::mesh(0), {DMat3(1e305), DVec3(0)}), Error) << "too far";
     EXPECT_THROW(editor.insert(0, ChildRef::mesh(9), Affine()), Error);
     EXPECT_THROW(editor.insert(9, ChildRef::mesh(0), Affine()), Error);
     EXPECT_THROW(editor.insert(1, ChildRef::group(0), Affine()), Error) << "a cycle";
     EXPECT_THROW(editor.insert(0, ChildRef::group(0), Affine()), Error) << "a cycle";
     EXPECT_THROW(editor.move({0, 3}, flat), Error);
+    EXPECT_THROW(editor.check({1, 3}, ChildRef::group(0), Affine()), Error);
     EXPECT_THROW(editor.find({}), Error);
     EXPECT_THROW(editor.find({3, 0}), Error) << "a mesh has nothing below";
     EXPECT_THROW(editor.findOwn({50, 999}), Error);
@@ -312,6 +314,94 @@ TEST(SceneEditor, cachedPointsFollow) {
             EXPECT_GT(lists.bytes(), 0u) << "the others are kept";
         }
     }
+}
+
+// A group that is built anew may have far fewer nodes than its lists know of.
+TEST(SceneEditor, listsFollowAGroupThatIsBuiltAnew) {
+    Scene scene = makeScene(50, 20);
+    SceneEditor editor(scene);
+    PointLists lists(scene);
+    ThreadPool pool(2);
+    Rng rng{29};
+    std::vector<SceneEditor::NewInstance> many(3000, {ChildRef::mesh(0), Affine()});
+    for (auto& i : many) i.group_from_child = randomPlace(rng, 20.0);
+    editor.insertMany(1, many, pool);
+    lists.sceneChanged(editor.takeChanges());
+    lists.startFrame({}, size_t(64) << 20, pool);
+    ListBlock scratch;
+    int lane = 0;
+    const size_t nodes_before = scene.groups[1].nodes.size();
+    for (uint32_t node = 0; node < nodes_before; ++node)
+        lists.points({ChildRef::group(1), node}, 0, 64, 128, scratch, lane);
+    for (const InstanceId id : idsOf(scene, 1)) editor.remove(id);
+    many.resize(40);
+    editor.insertMany(1, many, pool);
+    ASSERT_LT(scene.groups[1].nodes.size(), nodes_before / 2);
+    lists.sceneChanged(editor.takeChanges());
+    lists.startFrame({}, size_t(64) << 20, pool);
+    lists.points({ChildRef::group(1), 0}, 0, 64, 128, scratch, lane);
+    for (const uint32_t instance : scratch.instance) ASSERT_LT(instance, 100u);
+}
+
+// Each level holds the next four times: 10^9 places of the innermost.
+TEST(SceneEditor, editsOfDeeplyNestedGroupsTakeAsManyStepsAsThereAreGroups) {
+    constexpr uint32_t kLevels = 15;
+    Scene scene;
+    scene.path = "test";
+    GeneratedMesh box = makePrimitive("box", 12, Vec3(0.5f));
+    scene.materials = box.materials;
+    scene.meshes.push_back(box.mesh);
+    for (uint32_t level = 0; level < kLevels; ++level) {
+        Group group;
+        group.name = std::to_string(level);
+        const double side = std::exp2(double(kLevels - level));
+        group.instances = InstanceStore(DBox3{DVec3(-side), DVec3(side)});
+        for (int i = 0; i < 4; ++i) {
+            const DVec3 corner(i & 1 ? side / 2 : -side / 2, 0.0, i & 2 ? side / 2 : -side / 2);
+            group.instances.add(
+                level + 1 < kLevels ? ChildRef::group(level + 1) : ChildRef::mesh(0),
+                {DMat3(1.0), corner});
+        }
+        scene.groups.push_back(std::move(group));
+    }
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    const double area = scene.groups[0].area;
+    SceneEditor editor(scene);
+    const InstanceId id =
+        editor.insert(kLevels - 1, ChildRef::mesh(0), {DMat3(1.0), DVec3(0.25, 0.0, 0.25)});
+    EXPECT_NEAR(scene.groups[0].area, area * 5.0 / 4.0, area * 1e-9);
+    EXPECT_EQ(scene.groups[0].instances_total, 5.0 * std::pow(4.0, kLevels - 1));
+    const SceneChanges changes = editor.takeChanges();
+    EXPECT_TRUE(changes.anywhere);
+    EXPECT_LT(changes.nodes.size(), 200u);
+    editor.remove(id);
+    EXPECT_NEAR(scene.groups[0].area, area, area * 1e-9);
+    EXPECT_EQ(scene.groups[0].instances_total, std::pow(4.0, kLevels));
+}
+
+TEST(SceneEditor, groupsAreNestedNoDeeperThanScenesMayBe) {
+    Scene scene = makeScene(4, 0);
+    scene.groups.resize(kDeepestNesting + 8);
+    for (size_t g = 2; g < scene.groups.size(); ++g) {
+        scene.groups[g].name = std::to_string(g);
+        scene.groups[g].instances = InstanceStore(DBox3{DVec3(-1), DVec3(1)});
+    }
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    SceneEditor editor(scene);
+    // Each into the one before.
+    int depth = 1;
+    uint32_t holder = 0;
+    const auto nest = [&] {
+        for (uint32_t g = 2; g < scene.groups.size(); ++g, ++depth) {
+            editor.insert(holder, ChildRef::group(g), Affine());
+            holder = g;
+        }
+    };
+    EXPECT_THROW(nest(), Error);
+    EXPECT_EQ(depth, kDeepestNesting);
+    EXPECT_EQ(scene.groups[0].depth, kDeepestNesting);
 }
 
 }  // namespace
