@@ -121,9 +121,11 @@ bool SubpixelShader::showMembers(const SampleLookup& lookup, const Cell& cell, u
 bool SubpixelShader::showShared(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
                                 const Vec2& p_sub, float count) {
     sample_.extent = std::sqrt(count);
-    showPoint(lookup, p_camera, number, p_sub);
+    lookUp(lookup, p_camera, number, p_sub);
+    const bool is_shared = (*context_.materials)[sample_.material].normal_map.texture == kNoTexture;
+    if (is_shared) radiance_ = shadeSample(sample_);
     sample_.extent = 1.0f;
-    return (*context_.materials)[sample_.material].normal_map.texture == kNoTexture;
+    return is_shared;
 }
 
 void SubpixelShader::showPoint(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,

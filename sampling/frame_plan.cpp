@@ -6,6 +6,9 @@
 #include <sampling/projection.h>
 #include <scenegraph/object_id.h>
 
+#include <atomic>
+#include <utility>
+
 namespace stipple {
 
 namespace {
@@ -176,6 +179,11 @@ private:
     std::vector<uint32_t> stack_;
 };
 
+// Of some 150 or, of a draw, 350 bytes.
+constexpr size_t kMostParts = 10'000'000;
+
+size_t partsOf(const FramePlan& plan) { return plan.batches.size() + plan.raster.draws.size(); }
+
 void append(FramePlan& all, FramePlan& part) {
     const uint32_t batch_offset = uint32_t(all.batches.size());
     const uint32_t range_offset = uint32_t(all.raster.ranges.size());
@@ -229,11 +237,22 @@ FramePlan planFrame(const Scene& scene, const View& view, const RenderSettings& 
         std::swap(front, opened);
     }
     std::vector<FramePlan> parts(front.size());
+    std::atomic<size_t> planned = partsOf(first.plan);
     pool.forEach(front.size(), [&](size_t i, int) {
-        if (cancel && cancel->requested) return;
         Planner planner(scene, view, settings, rasterize_all);
         std::vector<Pending> stack{front[i]}, children;
-        while (!stack.empty()) {
+        size_t counted = 0;
+        for (size_t steps = 0; !stack.empty(); ++steps) {
+            if (steps % 1024 == 0) {
+                if (cancel && cancel->requested) return;
+                const size_t parts_now = partsOf(planner.plan);
+                planned += parts_now - std::exchange(counted, parts_now);
+                if (planned > kMostParts) {
+                    throw Error(ErrorCode::kUnsupported, "",
+                                "more than " + std::to_string(kMostParts) +
+                                    " things would be drawn one by one in a frame");
+                }
+            }
             const Pending p = stack.back();
             stack.pop_back();
             children.clear();

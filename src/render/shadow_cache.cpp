@@ -52,6 +52,9 @@ void ShadowCache::begin(const RenderSettings& settings) {
     RenderSettings drawn = shadowSettings(settings);
     drawn.width = none.width, drawn.height = none.height;
     drawn.splat_size = none.splat_size;
+    drawn.ewa_prefilter = none.ewa_prefilter;
+    drawn.pull_push_threshold = none.pull_push_threshold;
+    drawn.fill = none.fill;
     drawn.shadow_texel = none.shadow_texel;
     drawn.ao = none.ao, drawn.ao_radius = none.ao_radius, drawn.ao_rays = none.ao_rays;
     drawn.exposure = none.exposure, drawn.tone = none.tone;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pages of shadow maps that outlive a frame. A page depends on its light, its place and the scene,
 // not on the camera nor on the other pages of a frame: one that is kept is the one that would be
-// drawn, so a camera that moves pays for the pages that it has not seen.
+// drawn, so a camera that moves pays for the pages that it has not seen. After edits this is so but
+// for noise: pages that see nothing of what has changed stay, though the points of the octree nodes
+// around it are others.
 #pragma once
 
 #include <core/settings.h>
@@ -46,7 +48,7 @@ public:
     std::shared_ptr<const ShadowPage> find(const LightSpace& light, const PageKey& key);
     void keep(const LightSpace& light, const PageKey& key, std::shared_ptr<const ShadowPage> page);
     // At its end: what has not been asked for longest goes until no more than so many bytes are
-    // left; what this frame asked for stays.
+    // left, of the same age any.
     void end(size_t most_bytes);
     // Pages that see what has changed are forgotten.
     void sceneChanged(const SceneChanges& changes);

@@ -4,6 +4,7 @@
 #include <core/stopwatch.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -17,6 +18,8 @@ constexpr double kPageMargin = 8.0;
 // A level's pages lie within a rectangle of at most so many along a side; farther apart, they are
 // taken from the next coarser level.
 constexpr int64_t kMostPagesAlong = 1024;
+// Nor are there more pages in it, all lights' levels together (1 GB), but at least a few.
+constexpr size_t kMostPages = 16384, kLeastPages = 16;
 // Pages are drawn in views of so many along a side, that lie still in the world as they do, and one
 // more around. So a page is the same whichever others a frame needs.
 constexpr int64_t kPagesOfView = 16;
@@ -53,7 +56,8 @@ Vec3 normalOfPlane(const FirstLook& look, int x, int y) {
                 below = at(x, y + 1);
     const float along_x = 0.5f * (right - left), along_y = 0.5f * (below - above);
     const float most = kUnevenness * (std::abs(along_x) + std::abs(along_y)) + kRounding * here;
-    if (!(std::abs(left + right - 2.0f * here) <= most &&
+    // Beside the background of an orthographic view it is infinite.
+    if (!(most < kInfinity && std::abs(left + right - 2.0f * here) <= most &&
           std::abs(above + below - 2.0f * here) <= most))
         return Vec3(0.0f);
     const float focal = float(view.focal), from_x = float(x) + 0.5f - float(view.center_x),
@@ -63,18 +67,30 @@ Vec3 normalOfPlane(const FirstLook& look, int x, int y) {
                                                    here - from_x * along_x - from_y * along_y));
 }
 
-// Calls take(place, depth, normal) for what the look has seen, in camera space.
-template <class Take>
-void forEachSeen(const FirstLook& look, const Take& take) {
-    for (int y = 0; y < look.view.height; ++y) {
+// A place that the look has seen, camera space; normal: of the plane there, null if there is none.
+struct Seen {
+    Vec3 p, normal;
+    float depth;
+};
+
+// Those no farther from the eye than that, in the order of the picture.
+std::vector<Seen> seenPlaces(const FirstLook& look, float farthest, ThreadPool& pool) {
+    std::vector<std::vector<Seen>> of_row(static_cast<size_t>(look.view.height));
+    pool.forEach(of_row.size(), [&](size_t row, int) {
+        const int y = int(row);
         for (int x = 0; x < look.view.width; ++x) {
-            const float depth = look.depth[size_t(y) * size_t(look.view.width) + size_t(x)];
+            const float depth = look.depth[row * size_t(look.view.width) + size_t(x)];
             if (!(depth < kInfinity)) continue;
             Vec3 origin, direction;
             look.view.ray(float(x) + 0.5f, float(y) + 0.5f, origin, direction);
-            take(origin + direction * depth, depth, normalOfPlane(look, x, y));
+            const Vec3 p = origin + direction * depth;
+            if (!(glm::length(p) > farthest))
+                of_row[row].push_back({p, normalOfPlane(look, x, y), depth});
         }
-    }
+    });
+    std::vector<Seen> seen;
+    for (const std::vector<Seen>& row : of_row) seen.insert(seen.end(), row.begin(), row.end());
+    return seen;
 }
 
 // Of the angle at which light of that direction meets a plane; 1 where there is none.
@@ -90,8 +106,9 @@ public:
     void add(double x, double y, float width) {
         // What lies a little nearer or farther may fall into the level beside.
         const int low = levelExponent(width * 0.93f), high = levelExponent(width * 1.07f);
-        for (int e = low; e <= high; ++e) add(x, y, e);
-        add(x, y, high + kSpareLevels);
+        add(x, y, low, 0);
+        if (high != low) add(x, y, high, 1);
+        add(x, y, high + kSpareLevels, 2);
         if (pages_.size() < most_) return;
         sortUnique(pages_);
         most_ = 2 * pages_.size() + kFewPages;
@@ -104,18 +121,24 @@ public:
 private:
     static constexpr size_t kFewPages = 16384;
 
-    void add(double x, double y, int exponent) {
+    // which: of a place's levels.
+    void add(double x, double y, int exponent, size_t which) {
         const double texel = std::ldexp(1.0, exponent);
         const double per_page = 1.0 / (texel * kPageTexels), margin = kPageMargin * texel;
-        for (int k = 0; k < 4; ++k) {
+        for (size_t k = 0; k < 4; ++k) {
             const PageKey key{exponent,
                               int64_t(std::floor((x + (k & 1 ? margin : -margin)) * per_page)),
                               int64_t(std::floor((y + (k & 2 ? margin : -margin)) * per_page))};
-            if (pages_.empty() || !(pages_.back() == key)) pages_.push_back(key);
+            if (last_[which][k] == key) continue;
+            last_[which][k] = key;
+            pages_.push_back(key);
         }
     }
 
+    static constexpr PageKey kNone{std::numeric_limits<int>::min(), 0, 0};
     std::vector<PageKey> pages_;
+    std::array<std::array<PageKey, 4>, 3> last_ = {
+        {{kNone, kNone, kNone, kNone}, {kNone, kNone, kNone, kNone}, {kNone, kNone, kNone, kNone}}};
     size_t most_ = kFewPages;
 };
 
@@ -137,37 +160,73 @@ public:
     }
 
     std::unique_ptr<ShadowPages> build(const FirstLook& look, FrameStats& stats) {
-        std::vector<ShadowMap> suns;
-        for (const Sun& sun : scene_.lighting.suns) suns.push_back(drawSun(sun, look));
-        std::vector<LampShadow> lamps;
-        for (const PointLight& lamp : lampsOf(scene_.lighting))
-            lamps.push_back(drawLamp(lamp, look));
+        const std::vector<Seen> seen = seenPlaces(look, farthest_, drawer_.pool);
+        const std::vector<Sun>& suns = scene_.lighting.suns;
+        const std::vector<PointLight> lamps = lampsOf(scene_.lighting);
+        // What is needed, all lights at once; then maps, one after the other.
+        std::vector<MapRequest> of_suns(suns.size());
+        std::vector<LampRequest> of_lamps(lamps.size());
+        const float exposure =
+            std::exp2(scene_.lighting.exposure + float(settings_.exposure)) / float(kPi);
+        drawer_.pool.forEach(suns.size() + lamps.size(), [&](size_t i, int) {
+            if (i < suns.size()) {
+                of_suns[i] = requestSun(suns[i], seen);
+            } else {
+                of_lamps[i - suns.size()] = requestLamp(lamps[i - suns.size()], exposure, seen);
+            }
+        });
+        size_t maps = 0;
+        for (const MapRequest& request : of_suns) maps += !request.pages.empty();
+        for (const LampRequest& request : of_lamps) {
+            for (const MapRequest& face : request.faces) maps += !face.pages.empty();
+        }
+        most_pages_ = std::max(kMostPages / std::max(maps, size_t(1)), kLeastPages);
+        std::vector<ShadowMap> sun_maps;
+        for (MapRequest& request : of_suns) sun_maps.push_back(drawMap(std::move(request)));
+        std::vector<LampShadow> lamp_maps;
+        for (LampRequest& request : of_lamps) {
+            for (size_t f = 0; f < kCubeFaces; ++f)
+                request.shadow.faces[f] = drawMap(std::move(request.faces[f]));
+            lamp_maps.push_back(std::move(request.shadow));
+        }
         stats.shadow_points += drawn_.points_drawn;
-        return std::make_unique<ShadowPages>(view_, settings_.shadow_texel, std::move(suns),
-                                             std::move(lamps));
+        return std::make_unique<ShadowPages>(view_, settings_.shadow_texel, std::move(sun_maps),
+                                             std::move(lamp_maps));
     }
 
 private:
-    ShadowMap drawSun(const Sun& sun, const FirstLook& look) {
+    // Pages of a map, sorted.
+    struct MapRequest {
         LightSpace space;
-        space.world_from_light =
+        std::vector<PageKey> pages;
+    };
+    struct LampRequest {
+        LampShadow shadow;  // its faces are still to be drawn
+        std::array<MapRequest, kCubeFaces> faces;
+    };
+
+    MapRequest requestSun(const Sun& sun, const std::vector<Seen>& seen) const {
+        MapRequest request;
+        request.space.world_from_light =
             lookAt(DVec3(0.0), -DVec3(sun.direction_to_light)).world_from_camera;
-        const DMat3 sun_from_world = glm::transpose(space.world_from_light);
+        const DMat3 sun_from_world = glm::transpose(request.space.world_from_light);
         const DMat3 sun_from_camera = sun_from_world * glm::transpose(view_.camera_from_world);
         const DVec3 eye = sun_from_world * view_.eye_world;
         PageSet pages;
         const Vec3 direction(glm::transpose(sun_from_camera)[2]);
-        forEachSeen(look, [&](const Vec3& p_camera, float depth, const Vec3& normal) {
-            if (glm::length(p_camera) > farthest_) return;
-            const DVec3 p = eye + sun_from_camera * DVec3(p_camera);
-            pages.add(p.x, p.y, sizes_.wantedTexel(depth, sineOf(normal, direction)));
-        });
-        return drawMap(space, pages.take());
+        for (const Seen& s : seen) {
+            const DVec3 p = eye + sun_from_camera * DVec3(s.p);
+            pages.add(p.x, p.y, sizes_.wantedTexel(s.depth, sineOf(s.normal, direction)));
+        }
+        request.pages = pages.take();
+        return request;
     }
 
     // Only where it gives enough light to be seen.
-    LampShadow drawLamp(const PointLight& lamp, const FirstLook& look) {
-        LampShadow shadow;
+    LampRequest requestLamp(const PointLight& lamp, float exposure,
+                            const std::vector<Seen>& seen) const {
+        LampRequest request;
+        LampShadow& shadow = request.shadow;
         shadow.position = lamp.position;
         if (lamp.is_spot) {
             shadow.lamp_from_world =
@@ -177,37 +236,36 @@ private:
             shadow.lamp_from_world * glm::transpose(view_.camera_from_world);
         const Mat3 world_from_lamp(glm::transpose(shadow.lamp_from_world));
         const DVec3 eye = shadow.lamp_from_world * (view_.eye_world - lamp.position);
-        const float exposure =
-            std::exp2(scene_.lighting.exposure + float(settings_.exposure)) / float(kPi);
         std::array<PageSet, kCubeFaces> pages;
         std::array<float, kCubeFaces> far_z{};
         std::array<DMat3, kCubeFaces> face_from_lamp;
         for (int f = 0; f < kCubeFaces; ++f) face_from_lamp[size_t(f)] = cubeFaceFromLamp(f);
         const Mat3 camera_from_lamp(glm::transpose(lamp_from_camera));
-        forEachSeen(look, [&](const Vec3& p_camera, float depth, const Vec3& normal) {
-            if (glm::length(p_camera) > farthest_) return;
-            const DVec3 p_lamp = eye + lamp_from_camera * DVec3(p_camera);
+        for (const Seen& s : seen) {
+            const DVec3 p_lamp = eye + lamp_from_camera * DVec3(s.p);
             const Vec3 light = incidentLight(lamp, world_from_lamp * Vec3(-p_lamp));
-            if (std::max({light.x, light.y, light.z}) * exposure < kLeastLight) return;
+            if (std::max({light.x, light.y, light.z}) * exposure < kLeastLight) continue;
             const size_t face = size_t(cubeFaceOf(Vec3(p_lamp)));
             const DVec3 p = face_from_lamp[face] * p_lamp;
-            const float sine = sineOf(normal, camera_from_lamp * Vec3(glm::normalize(p_lamp)));
-            pages[face].add(p.x / p.z, p.y / p.z, sizes_.wantedTexel(depth, sine) / float(p.z));
+            const float sine = sineOf(s.normal, camera_from_lamp * Vec3(glm::normalize(p_lamp)));
+            pages[face].add(p.x / p.z, p.y / p.z, sizes_.wantedTexel(s.depth, sine) / float(p.z));
             far_z[face] = std::max(far_z[face], float(p.z));
-        });
+        }
         for (size_t f = 0; f < kCubeFaces; ++f) {
-            LightSpace space;
+            LightSpace& space = request.faces[f].space;
             space.is_lamp = true;
             space.lamp = lamp.position;
             space.world_from_light = glm::transpose(face_from_lamp[f] * shadow.lamp_from_world);
             // A power of two: pages are of use to other frames too.
             space.far_z = std::exp2(std::ceil(std::log2(far_z[f] * kBehindSeen)));
-            shadow.faces[f] = drawMap(space, pages[f].take());
+            request.faces[f].pages = pages[f].take();
         }
-        return shadow;
+        return request;
     }
 
-    ShadowMap drawMap(const LightSpace& space, std::vector<PageKey> pages) {
+    ShadowMap drawMap(MapRequest request) {
+        const LightSpace& space = request.space;
+        std::vector<PageKey>& pages = request.pages;
         ShadowMap shadow;
         shadow.light_from_world = glm::transpose(space.world_from_light);
         if (pages.empty()) return shadow;
@@ -231,14 +289,15 @@ private:
         return shadow;
     }
 
-    // False if the pages lie too far apart.
+    // False if the pages lie too far apart, or are too many.
     bool drawLevel(const std::vector<PageKey>& pages, const LightSpace& space, ShadowLevel& level) {
         int64_t x0 = pages[0].x, x1 = x0, y0 = pages[0].y, y1 = y0;
         for (const PageKey& key : pages) {
             x0 = std::min(x0, key.x), x1 = std::max(x1, key.x);
             y0 = std::min(y0, key.y), y1 = std::max(y1, key.y);
         }
-        if (x1 - x0 >= kMostPagesAlong || y1 - y0 >= kMostPagesAlong) return false;
+        if (x1 - x0 >= kMostPagesAlong || y1 - y0 >= kMostPagesAlong || pages.size() > most_pages_)
+            return false;
         level.columns = int(x1 - x0) + 1;
         level.rows = int(y1 - y0) + 1;
         level.page_slot.assign(size_t(level.columns) * size_t(level.rows), -1);
@@ -364,7 +423,8 @@ private:
     const RenderSettings& settings_;
     const ShadowPages sizes_;  // empty: for the sizes it asks for
     DVec3 bounds_min_, bounds_max_;
-    float farthest_ = kInfinity;  // from the eye, metres: behind that haze hides everything
+    size_t most_pages_ = kMostPages;  // of a level
+    float farthest_ = kInfinity;      // from the eye, metres: behind that haze hides everything
     FrameStats drawn_;
 };
 
