@@ -142,6 +142,7 @@ public:
           cancel_(cancel) {}
 
     PointBlockReport report;
+    uint64_t rays() const { return rays_cast_; }
 
     // Samples without holes where pixels are that large.
     std::vector<Sample> build(float pixel, const std::function<void(double)>& progress) {
@@ -294,7 +295,6 @@ private:
         }
         block_begin.push_back(uint32_t(samples.size()));
         report.samples_hit += samples.size();
-        report.rays = rays_cast_;
     }
 
     // Adds the view's blocks that what was chosen does not make up for.
@@ -449,6 +449,14 @@ private:
 
 }  // namespace
 
+double pointBlockBytes(const PointBlockOptions& options) {
+    const double pictures = double(options.directions) * kTests,
+                 pixels = double(options.resolution) * options.resolution;
+    // Heights and counts; and a view's samples, of all directions.
+    return pictures * pixels * (sizeof(float) + 1) +
+           double(options.directions) * pixels * sizeof(Sample);
+}
+
 SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material>& materials,
                              const std::vector<float>& patch_width, const DBox3& bounds,
                              double area, const PointBlockOptions& options, ThreadPool& pool,
@@ -468,13 +476,15 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
     constexpr int kCoarsest = 8;  // pixels along the sphere
     double done = 0.0, share = 0.7;
     std::vector<std::vector<Sample>> levels;
+    std::vector<float> pixels;
     for (int resolution = options.resolution; resolution >= kCoarsest; resolution /= 2) {
         const float pixel = float(2.0 * radius / resolution);
         levels.push_back(
             builder.build(pixel, [&](double fraction) { progress(done + share * fraction); }));
         done += share;
         share *= 0.3;
-        if (levels.back().empty()) levels.pop_back();
+        pixels.push_back(pixel);
+        if (levels.back().empty()) levels.pop_back(), pixels.pop_back();
     }
     if (levels.empty())
         throw Error(ErrorCode::kInvalidArgument, "", "no ray hits anything: is it too fine?");
@@ -484,7 +494,7 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
     }
     model.finishes = makeFinishes(materials, patch_width, index_of);
     for (size_t l = 0; l < levels.size(); ++l) {
-        const float pixel = float(2.0 * radius / (options.resolution >> l));
+        const float pixel = pixels[l];
         std::vector<Surfel> surfels;
         for (const Sample& s : levels[l])
             surfels.push_back({s.position, s.normal, s.albedo, index_of.at(s.finish_key), 1.0f});
@@ -500,6 +510,7 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
         model.levels.push_back(std::move(level));
     }
     const double pixel = 2.0 * radius / options.resolution;
+    builder.report.rays = builder.rays();
     builder.report.samples_kept = model.levels[0].size();
     if (area > 0.0)
         builder.report.per_pixel = double(model.levels[0].size()) * pixel * pixel / area;

@@ -37,6 +37,9 @@ struct PointBlockReport {
     double per_pixel = 0.0;  // samples kept per pixel of the surface at unit magnification
 };
 
+// Most memory that building takes, roughly.
+double pointBlockBytes(const PointBlockOptions& options);
+
 // caster: casts relative to `center`, the middle of `bounds` (both world space); the model is in
 // world space. area: of the surface, m^2. patch_width: by material, of connected patches. The same
 // model for any number of threads. progress may be called from any thread, one at a time. Throws

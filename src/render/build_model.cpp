@@ -2,6 +2,7 @@
 #include <render/build_model.h>
 
 #include <raycast/embree_raycaster.h>
+#include <scenegraph/io/load_context.h>
 #include <scenegraph/surfel_finish.h>
 
 namespace stipple {
@@ -10,6 +11,8 @@ SurfelModel buildPointBlockModel(const Scene& scene, const PointBlockOptions& op
                                  ThreadPool& pool, const CancelFlag& cancel,
                                  const std::function<void(double fraction)>& progress,
                                  PointBlockReport& report) {
+    MemoryBudget(0).require(pointBlockBytes(options), "--set",
+                            "point blocks of this resolution and so many directions");
     const DBox3 bounds = sceneBounds(scene);
     const DVec3 center = bounds.isEmpty() ? DVec3(0.0) : 0.5 * (bounds.min + bounds.max);
     const auto caster = makeEmbreeRayCaster(scene, center, pool.threadCount());
