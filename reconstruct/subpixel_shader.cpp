@@ -43,7 +43,7 @@ void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y
     const uint32_t number = DepthTile::numberOf(key);
     const float depth = DepthTile::depthOf(key);
     const bool is_known = number == last_number_ && !(number & kAnyTriangle);
-    if (is_known && depth == sample_.depth) return;
+    if (is_known && depth == sample_.depth && !hasVariedLight()) return;
     const float sub_x = float(x) + 0.5f, sub_y = float(y) + 0.5f;
     Vec3 origin, direction;
     context_.view.ray(sub_x, sub_y, origin, direction);

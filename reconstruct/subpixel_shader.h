@@ -58,7 +58,7 @@ public:
     // in their middle, within cells of kSharedCells^2 subpixels. Shadows and occlusion may fall
     // between them: they are asked for in cells half as wide, and no wider than half a pixel. There
     // all is, where there are projectors' pictures.
-    // Once for each where the normal varies: what is mirrored does not average as normals do.
+    // Once for each where there is a normal map: what is mirrored does not average as normals do.
     template <class Take>
     void showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
                    const Take& take);
@@ -67,7 +67,8 @@ public:
         const int side = std::min(kSharedCells, context_.view.subpixels);
         return hasVariedLight() ? std::max(side / 2, 1) : side;
     }
-    // Surface and radiance for so many subpixels around p_sub. False where the normal varies.
+    // Surface and radiance for so many subpixels around p_sub. False, and no
+    // radiance, where there is a normal map.
     bool showShared(const SampleLookup& lookup, const Vec3& p_camera, uint32_t number,
                     const Vec2& p_sub, float count);
     // Surface and radiance of a point, whose position is known.

@@ -45,17 +45,17 @@ BlockSides sidesOf(const SurfelLevel& level, const SurfelBlock& block) {
 // Subpixels that a ball touches, clipped to nothing; all of the region where it reaches the eye.
 SubpixelRect ballRect(const View& view, const Vec3& c, float r, const SubpixelRect& region) {
     const float f = float(view.focal);
+    const auto bounded = [](float v) { return std::clamp(v, -1e8f, 1e8f); };
     if (view.orthographic) {
-        return {int(std::floor(float(view.center_x) + f * (c.x - r))),
-                int(std::floor(float(view.center_y) + f * (c.y - r))),
-                int(std::ceil(float(view.center_x) + f * (c.x + r))) + 1,
-                int(std::ceil(float(view.center_y) + f * (c.y + r))) + 1};
+        return {int(std::floor(bounded(float(view.center_x) + f * (c.x - r)))),
+                int(std::floor(bounded(float(view.center_y) + f * (c.y - r)))),
+                int(std::ceil(bounded(float(view.center_x) + f * (c.x + r)))) + 1,
+                int(std::ceil(bounded(float(view.center_y) + f * (c.y + r)))) + 1};
     }
     const float near = c.z - r, far = c.z + r;
     if (!(near > view.near_z)) return region;
     const auto low = [&](float v) { return v / (v < 0.0f ? near : far); };
     const auto high = [&](float v) { return v / (v < 0.0f ? far : near); };
-    const auto bounded = [](float v) { return std::clamp(v, -1e8f, 1e8f); };
     return {int(std::floor(bounded(float(view.center_x) + f * low(c.x - r)))),
             int(std::floor(bounded(float(view.center_y) + f * low(c.y - r)))),
             int(std::ceil(bounded(float(view.center_x) + f * high(c.x + r)))) + 1,
@@ -348,8 +348,8 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
                 }
             }
             const float width = finish.patch_width * placed.length_scale * float(view.focal);
-            out.is_wide =
-                out.is_wide || width >= kSurfaceWidth * (view.orthographic ? 1.0f : center.z);
+            out.is_wide |=
+                is_in_front && width >= kSurfaceWidth * (view.orthographic ? 1.0f : center.z);
         }
         out.first_number = addRun(placed, first, shift) | kTriangleBit;
         if (!context_.sink->take(out)) context_.runs.pop_back();

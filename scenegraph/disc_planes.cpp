@@ -23,6 +23,7 @@ struct Places {
 // weighed by their distance.
 STIPPLE_VECTOR_CLONES void planesAt(const Places& p, int count, Places& normal) {
     constexpr int kLanes = 16;
+    static_assert(kBlockSurfels % kLanes == 0);
     for (int first = 0; first < count; first += kLanes) {
         float xx[kLanes] = {}, xy[kLanes] = {}, xz[kLanes] = {};
         float yy[kLanes] = {}, yz[kLanes] = {}, zz[kLanes] = {};

@@ -71,6 +71,7 @@ SceneEditor::OpenGroup& SceneEditor::opened(uint32_t index) {
     open->rank_of.resize(group.next_index);
     std::iota(open->rank_of.begin(), open->rank_of.end(), 0);
     for (uint32_t i = 0; i < n; ++i) {
+        if (group.instances.child(i).isNone()) continue;
         open->slot_of[group.listed_index[i]] = i;
         open->rank_of[group.listed_index[i]] = i;
     }

@@ -254,7 +254,7 @@ std::string nameHint(const std::string& name, const std::vector<std::string>& kn
     if (!nearest.empty()) return "; did you mean " + inQuotes(nearest) + "?";
     constexpr size_t kFew = 8;
     if (known.empty() || known.size() > kFew) return "";
-    std::string list = "; there is ";
+    std::string list = "; known: ";
     for (size_t i = 0; i < known.size(); ++i)
         list += (i == 0 ? "" : i + 1 == known.size() ? " and " : ", ") + inQuotes(known[i]);
     return list;

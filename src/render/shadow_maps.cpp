@@ -18,7 +18,7 @@ constexpr double kPageMargin = 8.0;
 // A level's pages lie within a rectangle of at most so many along a side; farther apart, they are
 // taken from the next coarser level.
 constexpr int64_t kMostPagesAlong = 1024;
-// Nor are there more pages in it, all lights' levels together (1 GB), but at least a few.
+// So many pages a frame (1 GB), shared by the levels of all lights; each may have a few.
 constexpr size_t kMostPages = 16384, kLeastPages = 16;
 // Pages are drawn in views of so many along a side, that lie still in the world as they do, and one
 // more around. So a page is the same whichever others a frame needs.
@@ -175,12 +175,12 @@ public:
                 of_lamps[i - suns.size()] = requestLamp(lamps[i - suns.size()], exposure, seen);
             }
         });
-        size_t maps = 0;
-        for (const MapRequest& request : of_suns) maps += !request.pages.empty();
+        size_t levels = 0;
+        for (const MapRequest& request : of_suns) levels += request.levels();
         for (const LampRequest& request : of_lamps) {
-            for (const MapRequest& face : request.faces) maps += !face.pages.empty();
+            for (const MapRequest& face : request.faces) levels += face.levels();
         }
-        most_pages_ = std::max(kMostPages / std::max(maps, size_t(1)), kLeastPages);
+        most_pages_ = std::max(kMostPages / std::max(levels, size_t(1)), kLeastPages);
         std::vector<ShadowMap> sun_maps;
         for (MapRequest& request : of_suns) sun_maps.push_back(drawMap(std::move(request)));
         std::vector<LampShadow> lamp_maps;
@@ -199,6 +199,13 @@ private:
     struct MapRequest {
         LightSpace space;
         std::vector<PageKey> pages;
+
+        size_t levels() const {
+            size_t n = 0;
+            for (size_t i = 0; i < pages.size(); ++i)
+                n += i == 0 || pages[i].exponent != pages[i - 1].exponent;
+            return n;
+        }
     };
     struct LampRequest {
         LampShadow shadow;  // its faces are still to be drawn
@@ -245,11 +252,26 @@ private:
             const DVec3 p_lamp = eye + lamp_from_camera * DVec3(s.p);
             const Vec3 light = incidentLight(lamp, world_from_lamp * Vec3(-p_lamp));
             if (std::max({light.x, light.y, light.z}) * exposure < kLeastLight) continue;
-            const size_t face = size_t(cubeFaceOf(Vec3(p_lamp)));
-            const DVec3 p = face_from_lamp[face] * p_lamp;
-            const float sine = sineOf(s.normal, camera_from_lamp * Vec3(glm::normalize(p_lamp)));
-            pages[face].add(p.x / p.z, p.y / p.z, sizes_.wantedTexel(s.depth, sine) / float(p.z));
-            far_z[face] = std::max(far_z[face], float(p.z));
+            const double distance = glm::length(p_lamp);
+            if (!(distance > 0.0)) continue;
+            const float sine = sineOf(s.normal, camera_from_lamp * Vec3(p_lamp / distance));
+            const float texel = sizes_.wantedTexel(s.depth, sine);
+            const size_t own = size_t(cubeFaceOf(Vec3(p_lamp)));
+            const auto add = [&](size_t face, const DVec3& p) {
+                pages[face].add(p.x / p.z, p.y / p.z, texel / float(p.z));
+                far_z[face] = std::max(far_z[face], float(p.z));
+            };
+            const DVec3 p = face_from_lamp[own] * p_lamp;
+            add(own, p);
+            // Beside an edge of the cube, what is a margin farther has its pages in the next face.
+            const double margin = kPageMargin * double(texel);
+            if (std::max(std::abs(p.x), std::abs(p.y)) + margin < p.z) continue;
+            for (size_t face = 0; face < kCubeFaces; ++face) {
+                const DVec3 q = face_from_lamp[face] * p_lamp;
+                if (face != own && q.z > 0.0 &&
+                    std::max(std::abs(q.x), std::abs(q.y)) < q.z + margin)
+                    add(face, q);
+            }
         }
         for (size_t f = 0; f < kCubeFaces; ++f) {
             LightSpace& space = request.faces[f].space;
@@ -311,7 +333,8 @@ private:
             level.pages.push_back({cache_.find(space, key)});
             origin_z = std::min(origin_z, level.pages.back().page->origin_z);
         }
-        for (ShadowLevel::PlacedPage& placed : level.pages)
+        if (!(origin_z < std::numeric_limits<double>::infinity())) origin_z = 0.0;
+        for (ShadowLevel::PlacedPage& placed : level.pages)  // infinite: nothing is there
             placed.behind = float(placed.page->origin_z - origin_z);
         if (space.is_lamp) {
             level.corner_x = double(x0) * kPageTexels;
@@ -364,7 +387,8 @@ private:
             depthRange(space.world_from_light, corner, kAlong * page, z_min, z_max);
             is_empty = !(z_min <= z_max);
             const double origin_z = is_empty ? 0.0 : std::floor(z_min) - 1.0;
-            for (const auto& p : own) p->origin_z = origin_z;
+            for (const auto& p : own)
+                p->origin_z = is_empty ? std::numeric_limits<double>::infinity() : origin_z;
             view.orthographic = true;
             view.eye_world = space.world_from_light * DVec3(corner.x, corner.y, origin_z);
             view.near_z = 0.5f;

@@ -670,7 +670,7 @@ JSON
     for line in "line 1: /child: .*did you mean \"ball\"" "line 2: singular" "line 3: /translation: " "line 4: " \
         "line 5: there is no instance 7" "line 6: " "line 7: group \"all\" contains \"balls\"" \
         "line 8: /objct: .*did you mean \"object\"" "line 9: /do: " "line 10: needs \"output\"" \
-        "line 11: .*folder of edit.scene.json.*: edit.scene.json$" "line 12: " "line 13: /child: .*; there is .*\"ball\"" \
+        "line 11: .*folder of edit.scene.json.*: edit.scene.json$" "line 12: " "line 13: /child: .*; known: .*\"ball\"" \
         "line 14: /as: .*digit" "line 15: /scale: .*up to 1e6" "line 18: /as: there is \"mine\" already"; do
         grep -qE "edits.jsonl: $line" stderr.txt || fail "no such error: $line"
     done

@@ -77,7 +77,7 @@ TEST(IoJson, schemaProblemsNameTheInnermostPlace) {
     EXPECT_EQ(problem->message, "unknown key \"lists\"; did you mean \"list\"?");
     problem = schema.firstProblem(Json::parse(R"({"colour": []})"));
     ASSERT_TRUE(problem);
-    EXPECT_EQ(problem->message, "unknown key \"colour\"");
+    EXPECT_EQ(problem->message, "unknown key \"colour\"; known: \"list\"");
 }
 
 }  // namespace
