@@ -80,8 +80,9 @@ inline __attribute__((always_inline)) void placeLoop(const Window& window, const
         const int is_in_tile = is_there & (px >= left) & (px < right) & (py >= top) & (py < bottom);
         kept += is_there & (px >= inner_left) & (px < inner_right) & (py >= inner_top) &
                 (py < inner_bottom);
-        const int ix = int(std::min(std::max(px, left), right)),
-                  iy = int(std::min(std::max(py, top), bottom));
+        // In this order what is no number, behind the block's last point, becomes the first bound.
+        const int ix = int(std::min(right, std::max(left, px))),
+                  iy = int(std::min(bottom, std::max(top, py)));
         const float dx = std::abs(px - float(ix) - 0.5f), dy = std::abs(py - float(iy) - 0.5f);
         const int is_near = (dx <= half_side[i]) & (dy <= half_side[i]);
         // The same choice in every tile that sees the point: from its coordinates.

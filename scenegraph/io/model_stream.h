@@ -80,7 +80,7 @@ public:
         requireItems(n, sizeof(T));
         budget_.take(double(n) * sizeof(T), where_, std::to_string(n) + " values");
         v.resize(n);
-        std::memcpy(v.data(), take(n * sizeof(T)), n * sizeof(T));
+        if (n > 0) std::memcpy(v.data(), take(n * sizeof(T)), n * sizeof(T));
     }
     // least: bytes that an item has at least.
     template <class T, class Each>
