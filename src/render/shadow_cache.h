@@ -64,7 +64,6 @@ private:
         std::map<PageKey, Entry> pages;
     };
     Light& lightOf(const LightSpace& space);
-    void forget();
 
     std::vector<Light> lights_;
     RenderSettings settings_;
