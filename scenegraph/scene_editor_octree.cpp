@@ -3,7 +3,9 @@
 #include <scenegraph/group_sums.h>
 #include <scenegraph/scene_editor.h>
 
+#include <algorithm>
 #include <bit>
+#include <functional>
 
 namespace stipple {
 
@@ -376,6 +378,7 @@ void SceneEditor::refreshNodes(uint32_t group_index, const std::vector<uint32_t>
             for (uint32_t c = 0; c < node.child_count; ++c)
                 order.emplace_back(level + 1, node.first_child + c);
         }
+        std::reverse(order.begin(), order.end());
     } else {
         for (const uint32_t node : nodes) {
             int level = 0;
@@ -383,9 +386,12 @@ void SceneEditor::refreshNodes(uint32_t group_index, const std::vector<uint32_t>
             for (uint32_t n = node; n != 0; n = open.parent[n]) order.emplace_back(level--, n);
             order.emplace_back(0, 0);
         }
+        // The path of one node is in order.
+        if (nodes.size() > 1) {
+            std::sort(order.begin(), order.end(), std::greater<>());
+            order.erase(std::unique(order.begin(), order.end()), order.end());
+        }
     }
-    std::sort(order.begin(), order.end(), std::greater<>());
-    order.erase(std::unique(order.begin(), order.end()), order.end());
     for (const auto& [level, node] : order) {
         accumulateNode(
             group, group.nodes, [&](ChildRef r) { return childSums(scene_, r); },
