@@ -12,8 +12,8 @@ namespace {
 // through the bilinear mesh and one more by making its neighbours' cells interior ones.
 constexpr int kReachCells = 4;
 constexpr int kBlock = 4;
-// Neighbouring cells of one surface differ by no more than this many of their widths in depth.
-constexpr float kSlope = 6.0f;
+// Where a mesh ends it fades over this many subpixels, however wide its cells are.
+constexpr float kFadeWidth = 2.0f;
 
 }  // namespace
 
@@ -65,13 +65,12 @@ float LevelDepths::surfaceAt(int l, int x, int y) const {
     const size_t i = level.index(x, y);
     const float depth = level.native[i], finer = level.finer[i];
     if (!(finer < depth)) return depth;
-    const float step = kSlope * float(1 << l) * (orthographic_ ? 1.0f : finer);
+    const float step = kSlope * per_subpixel_ * float(1 << l) * (orthographic_ ? 1.0f : finer);
     for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
             const int nx = std::clamp(x + dx, level.x0, level.x0 + level.width - 1),
                       ny = std::clamp(y + dy, level.y0, level.y0 + level.height - 1);
-            if (std::abs(level.native[level.index(nx, ny)] - finer) <= step * per_subpixel_)
-                return finer;
+            if (std::abs(level.native[level.index(nx, ny)] - finer) <= step) return finer;
         }
     }
     return depth;
@@ -126,10 +125,10 @@ void LevelDepths::finish(const DepthTile& hits, double k) {
                     const uint64_t* row = hits.row(y);
                     for (int x = x0; x < x1; ++x) hit += DepthTile::depthOf(row[x]) <= limit;
                 }
-                // Three eighths of a cell make a corner of the mesh, an eighth or less none: the
-                // mesh ends near the surface's edge on average.
+                // The mesh is half there where a straight edge of the surface lies.
                 const float share = float(hit) / (hit_share * float((x1 - x0) * (y1 - y0)));
-                level.solidity[i] = std::clamp(4.0f * share - 0.5f, 0.0f, 1.0f);
+                level.solidity[i] = share < 0.5f ? 2.0f * share / (1.0f + 2.0f * share)
+                                                 : 0.5f / (1.5f - std::min(share, 1.0f));
             }
         }
     }
@@ -164,7 +163,8 @@ float LevelDepths::coverage(int x, int y, float depth) const {
             (1.0f - tx) * corner(l, cx, cy, depth) + tx * corner(l, cx + 1, cy, depth);
         const float bottom =
             (1.0f - tx) * corner(l, cx, cy + 1, depth) + tx * corner(l, cx + 1, cy + 1, depth);
-        sum += (1.0f - ty) * top + ty * bottom;
+        const float mesh = (1.0f - ty) * top + ty * bottom;
+        sum += std::clamp(0.5f + (mesh - 0.5f) * std::max(1.0f, size / kFadeWidth), 0.0f, 1.0f);
     }
     return std::min(sum, 1.0f);
 }

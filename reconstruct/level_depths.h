@@ -26,6 +26,8 @@ public:
     LevelDepths(const View& view, int highest, PullPushCoverage coverage, bool threshold);
 
     int highest() const { return highest_; }
+    // Depth that one surface gains over a subpixel, at most: metres per depth, or metres.
+    float slope() const { return kSlope * per_subpixel_; }
     // Level of a point on a patch of that width: no cell is wider than half the patch, so leaves
     // hide nothing beside them.
     int levelOf(uint8_t width_code) const { return level_of_width_[width_code]; }
@@ -47,7 +49,8 @@ public:
     // Call when all points are in and `hits` holds the nearest at each subpixel. k: points a
     // subpixel.
     void finish(const DepthTile& hits, double k);
-    // How far [0, 1] the levels cover what lies at that depth at a subpixel's centre.
+    // How far [0, 1] the levels cover what lies at that depth at a subpixel's centre. A bilinear
+    // mesh is wholly there but within a subpixel of where it is half there.
     float coverage(int x, int y, float depth) const;
 
     // True if all cells near the rectangle are in front of z_min, so that nothing there can change
@@ -57,6 +60,9 @@ public:
     void refreshHidden();
 
 private:
+    // Neighbouring cells of one surface differ by no more than this many of their widths in depth.
+    static constexpr float kSlope = 6.0f;
+
     struct Level {
         int x0 = 0, y0 = 0, width = 0, height = 0;  // in cells
         // Nearest depth of points of this level, and of points of finer ones.

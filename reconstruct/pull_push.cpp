@@ -57,7 +57,14 @@ public:
     void endTile(const SampleLookup& lookup) override {
         levels_.finish(hits_, context_.settings.samples);
         weigh(lookup);
-        pullPush(weighted_, levels_.highest());
+        PullPushRules rules;
+        rules.levels = levels_.highest();
+        rules.slope = levels_.slope();
+        rules.orthographic = context_.view.orthographic;
+        rules.coverage = [&](int x, int y, float depth) {
+            return levels_.coverage(region_.x0 + x, region_.y0 + y, depth);
+        };
+        pullPush(weighted_, rules);
         shaded_.reset(inner_);
         for (int y = inner_.y0; y < inner_.y1; ++y) {
             const float* from =
@@ -118,6 +125,7 @@ private:
                     for (int c = 0; c < 3; ++c) values[c] = shader_.radiance()[c];
                     values[3] = 1.0f;
                     values[4] = depth;
+                    weighted_.depths[i] = depth;
                 }
                 weighted_.weights[i] = weight;
             }

@@ -13,8 +13,9 @@
 // - The thesis tests a point against its level when it is drawn, so the picture depends on the
 //   points' order. Here all buffers are filled, by minima, before a subpixel is judged at the
 //   tile's end: the same, in one pass over the points.
-// - A cell at a silhouette counts by how much of it the surface fills, not as a whole, so that
-//   colours hardly bleed over straight edges, and never by more than a cell.
+// - A cell at a silhouette counts by how much of it the surface fills, and the mesh fades over two
+//   subpixels, not over a cell: foreground colours end where the surface does.
+// - What a surface does not cover is filled from what lies behind it (pull_push_fill.h).
 // - Holes where two levels meet, open in the thesis: neither level's mesh covers what lies between
 //   the last cells' centres of both. Finer points therefore enter the coarser buffers, too, and
 //   count in cells next to one that has points of that level, as do triangles: the coarse mesh goes

@@ -56,22 +56,19 @@ TEST(Silhouettes, areNotCarriedOverMoreThanTwoPixels) {
         for (int x = 0; x < kWidth; ++x) n_box += rays.pixel(x, y)[0] > rays.pixel(x, y)[2];
     }
     EXPECT_GT(n_box, 2000);
+    const auto beyond = pixelsBeyond(rays, 2);
+    EXPECT_GT(beyond.size(), 2000u);
     r.settings.method = Method::kPoints;
     r.settings.area_threshold = 1e6;  // all triangles as points
     r.settings.large_triangle = 1e6;
     for (const Reconstruct reconstruct : kReconstructions) {
         for (const int subpixels : {1, 2, 4}) {
-            for (const double samples : {1.0, 4.0}) {
+            for (const double samples : {0.5, 1.0, 4.0}) {
                 r.settings.reconstruct = reconstruct;
                 r.settings.subpixels = subpixels;
                 r.settings.samples = samples;
                 const Frame frame = Renderer(scene, pool).render(r);
-                EXPECT_GT(frame.stats.points_kept, uint64_t(kWidth * kHeight / 2));
-                // Known limit: the cells that pull-push fills from are 4 pixels wide there.
-                const bool has_wide_cells =
-                    reconstruct == Reconstruct::kPullPush && subpixels == 1 && samples == 1.0;
-                const auto beyond = pixelsBeyond(rays, has_wide_cells ? 4 : 2);
-                EXPECT_GT(beyond.size(), 2000u);
+                EXPECT_GT(frame.stats.points_kept, uint64_t(kWidth * kHeight / 4));
                 int reddish = 0;
                 for (const auto& [x, y] : beyond) reddish += frame.image.pixel(x, y)[0] > 0.01f;
                 EXPECT_EQ(reddish, 0) << int(reconstruct) << " " << subpixels << " " << samples;

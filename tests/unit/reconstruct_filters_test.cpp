@@ -75,14 +75,23 @@ TEST(ReconstructFilters, pixelFiltersKeepConstantsAndVariance) {
     EXPECT_NEAR(std::sqrt(square / sum), 5.0, 0.5);  // cut off at 2.5 sigma
 }
 
+PullPushRules rulesOf(int levels) {
+    PullPushRules rules;
+    rules.levels = levels;
+    rules.slope = 0.01f;
+    rules.coverage = [](int, int, float) { return 0.0f; };
+    return rules;
+}
+
 TEST(ReconstructFilters, pullPushOfAFullImageIsTheIdentity) {
     WeightedImage image;
     image.reset(37, 22, 3);
     Rng rng{5};
     for (float& v : image.values) v = float(rng.uniform());
     std::fill(image.weights.begin(), image.weights.end(), 1.0f);
+    std::fill(image.depths.begin(), image.depths.end(), 2.0f);
     const std::vector<float> before = image.values;
-    pullPush(image, 4);
+    pullPush(image, rulesOf(4));
     EXPECT_EQ(image.values, before);
 }
 
@@ -93,10 +102,11 @@ TEST(ReconstructFilters, pullPushFillsHolesAndKeepsConstants) {
     for (size_t i = 0; i < image.weights.size(); ++i) {
         const double u = rng.uniform();
         image.weights[i] = u < 0.4 ? 0.0f : float(rng.uniform());
+        image.depths[i] = 2.0f;
         image.values[2 * i] = image.weights[i] > 0.0f ? 3.0f : -100.0f;
         image.values[2 * i + 1] = image.weights[i] > 0.0f ? 0.5f : 1e9f;
     }
-    pullPush(image, 5);
+    pullPush(image, rulesOf(5));
     for (size_t i = 0; i < image.weights.size(); ++i) {
         EXPECT_NEAR(image.values[2 * i], 3.0f, 1e-4f);
         EXPECT_NEAR(image.values[2 * i + 1], 0.5f, 1e-4f);
@@ -105,11 +115,52 @@ TEST(ReconstructFilters, pullPushFillsHolesAndKeepsConstants) {
     image.reset(64, 64, 1);
     image.values[0] = 1.0f;
     image.weights[0] = 1.0f;
-    pullPush(image, 3);
+    image.depths[0] = 2.0f;
+    pullPush(image, rulesOf(3));
     EXPECT_NEAR(image.values[7 * 64 + 7], 1.0f, 1e-5f);
     EXPECT_EQ(image.values[40 * 64 + 40], 0.0f);
-    pullPush(image, 0);
+    pullPush(image, rulesOf(0));
     EXPECT_EQ(image.values[40 * 64 + 40], 0.0f);
+}
+
+// A near surface on the left, a far one on the right, sky above both; holes everywhere.
+TEST(ReconstructFilters, pullPushFillsFromTheSurfaceThatIsThere) {
+    constexpr int kEdge = 21, kSky = 13;
+    for (const bool covers : {false, true}) {
+        PullPushRules rules = rulesOf(4);
+        rules.coverage = [&](int x, int, float depth) {
+            return covers || (x < kEdge && depth > 4.0f) ? 1.0f : 0.0f;
+        };
+        WeightedImage image;
+        image.reset(48, 48, 2);
+        Rng rng{11};
+        size_t i = 0;
+        for (int y = 0; y < 48; ++y) {
+            for (int x = 0; x < 48; ++x, ++i) {
+                if (y >= kSky && rng.uniform() < 0.5) continue;
+                image.weights[i] = 1.0f;
+                if (y < kSky) continue;
+                image.depths[i] = x < kEdge ? 3.0f : 9.0f;
+                image.values[2 * i + (x < kEdge ? 0 : 1)] = 1.0f;
+            }
+        }
+        pullPush(image, rules);
+        double mixed = 0.0;
+        for (int y = 0; y < 48; ++y) {
+            for (int x = 0; x < 48; ++x) {
+                const float* value = &image.values[2 * size_t(y * 48 + x)];
+                EXPECT_NEAR(value[0] + value[1], y < kSky ? 0.0f : 1.0f, 1e-5f);
+                if (!covers && x >= kEdge) {
+                    EXPECT_EQ(value[0], 0.0f) << x << "," << y;
+                }
+                mixed += double(value[0] * value[1]);
+            }
+        }
+        // Where it is said to be covered, the mean of both goes over the edge.
+        if (covers) {
+            EXPECT_GT(mixed, 1.0);
+        }
+    }
 }
 
 TEST(ReconstructFilters, levelsFollowTheDensity) {
@@ -149,8 +200,10 @@ TEST(ReconstructFilters, oneCellCoversAsTheBilinearMeshSays) {
     }
     levels.finish(hits, 20.0);
     // The centre of the subpixel at (17, 17) is an eighth of a cell from the vertex at (18, 18).
-    EXPECT_NEAR(levels.coverage(17, 17, 1e6f), 0.875f * 0.875f, 1e-5f);
-    EXPECT_NEAR(levels.coverage(20, 17, 1e6f), 0.375f * 0.875f, 1e-5f);
+    // The mesh fades over half a cell, two subpixels.
+    EXPECT_EQ(levels.coverage(17, 17, 1e6f), 1.0f);
+    EXPECT_NEAR(levels.coverage(19, 16, 1e6f), 0.5f + 2.0f * (0.625f * 0.625f - 0.5f), 1e-5f);
+    EXPECT_NEAR(levels.coverage(20, 17, 1e6f), 0.5f + 2.0f * (0.375f * 0.875f - 0.5f), 1e-5f);
     EXPECT_EQ(levels.coverage(23, 17, 1e6f), 0.0f);
     EXPECT_EQ(levels.coverage(17, 17, 10.0f), 0.0f);
     LevelDepths squares(view, 2, PullPushCoverage::kSquares, false);
