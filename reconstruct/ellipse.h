@@ -122,11 +122,12 @@ private:
     std::array<Vec3, 2> across_ = {};  // u and v of an offset
 };
 
-// Depth of the plane there; the centre's where the plane is not in front of the eye.
+// Depth of the plane there; infinite where it is more than four times as far as the centre, or not
+// in front of the eye: no disc that is drawn as an ellipse reaches there.
 inline float planeDepth(const View& view, const Ellipse& e, const Vec2& d) {
     const float q = e.q + glm::dot(e.slope, d);
     if (view.orthographic) return q;
-    return q > 0.25f * e.q ? 1.0f / q : 1.0f / e.q;
+    return q > 0.25f * e.q ? 1.0f / q : kInfinity;
 }
 
 // Calls visit(x, y, d, r) for the centres at d from the ellipse's centre, within x0..y1, for which

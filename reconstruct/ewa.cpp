@@ -155,7 +155,9 @@ private:
         visitEllipse(e.center, v, 1.0f, rect.x0, rect.y0, rect.x1, rect.y1,
                      [&](int x, int y, const Vec2& d, float) {
                          const float depth = planeDepth(context_.view, e, d);
-                         if (!cut.hasSurface(e.center.x + d.x, e.center.y + d.y, depth)) return;
+                         if (!(depth < kInfinity) ||
+                             !cut.hasSurface(e.center.x + d.x, e.center.y + d.y, depth))
+                             return;
                          uint64_t& key = front_.row(y)[x];
                          const uint64_t of_disc = pointKey(block, i, depth);
                          is_used |= of_disc < key;
@@ -217,7 +219,7 @@ private:
         visitEllipse(e.center, v, kKernelEnd, inner_.x0, inner_.y0, inner_.x1, inner_.y1,
                      [&](int x, int y, const Vec2& d, float r) {
                          const float depth = planeDepth(context_.view, e, d);
-                         if (!isOnFront(depth, front_.row(y)[x], code) ||
+                         if (!(depth < kInfinity) || !isOnFront(depth, front_.row(y)[x], code) ||
                              !cut.hasSurface(e.center.x + d.x, e.center.y + d.y, depth))
                              return;
                          const float w = scale * kernel(r);

@@ -17,6 +17,8 @@ namespace {
 
 // Discs no wider than this are drawn as points, too.
 constexpr float kFewSubpixels = 3.0f;
+// Discs with a radius of more than this share of their distance are no ellipses in the picture.
+constexpr float kNearShare = 0.25f;
 // A model whose coarsest level is finer than this share of what is wanted is far.
 constexpr float kFarShare = 0.5f;
 
@@ -141,9 +143,12 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         const float z = std::max(center.z - radius, view.near_z);
         const float per_metre_here =
             scaled_focal * (view.orthographic ? 1.0f : stretch(view, center, z) / z);
-        const bool with_discs = may_be_discs && sides.largest * per_metre_here > wanted;
+        const bool are_near = !view.orthographic && sides.longest * reach > kNearShare * z;
+        const bool with_discs =
+            (may_be_discs || are_near) && sides.largest * per_metre_here > wanted;
         // Discs seen edge on cover no subpixel: their middles do.
-        const bool with_points = !with_discs || sides.smallest * per_metre_here < kFewSubpixels;
+        const bool with_points =
+            !with_discs || (may_be_discs && sides.smallest * per_metre_here < kFewSubpixels);
         if (with_discs || !may_be_discs) radius += model.discSide() * sides.longest * reach;
         if (center.z + radius <= view.near_z || center.z - radius > view.far_z) continue;
         const SubpixelRect rect = ballRect(view, center, radius, region);
@@ -323,19 +328,19 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
              ++k) {
             Surfel& s = surfels_[k - b.first];
             const Vec3 center(to_camera.point(DVec3(s.position)));
-            // Before the eye and with the front to it.
+            // With the front to the eye, and not all behind it.
             const SurfelFinish& finish = placed.model.finishes[s.finish];
-            bool is_in_front = !showsBack(placed.eye, finish.material, s.normal, s.position);
+            const bool is_front = !showsBack(placed.eye, finish.material, s.normal, s.position);
+            bool is_before_eye = false;
             s.normal = planes_[k - b.first];
             const int n = discPolygon(
                 level, s, placed.model.discSide() * level.spacing * s.radius_share, corners);
             for (int c = 0; c < n; ++c) {
                 corners[size_t(c)] = center + linear * corners[size_t(c)];
-                is_in_front = is_in_front && corners[size_t(c)].z > view.near_z;
+                is_before_eye = is_before_eye || corners[size_t(c)].z > view.near_z;
             }
             for (int t = 0; t < 1 << shift; ++t) {
-                // Before the eye, or not at all.
-                const bool is_there = is_in_front && t + 2 < n;
+                const bool is_there = is_front && is_before_eye && t + 2 < n;
                 const Vec3 nowhere(0, 0, view.near_z * 2.0f);
                 const Vec3 vertices[3] = {is_there ? corners[0] : nowhere,
                                           is_there ? corners[size_t(t) + 1] : nowhere,
@@ -348,8 +353,8 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
                 }
             }
             const float width = finish.patch_width * placed.length_scale * float(view.focal);
-            out.is_wide |=
-                is_in_front && width >= kSurfaceWidth * (view.orthographic ? 1.0f : center.z);
+            out.is_wide |= is_front && is_before_eye &&
+                           width >= kSurfaceWidth * (view.orthographic ? 1.0f : center.z);
         }
         out.first_number = addRun(placed, first, shift) | kTriangleBit;
         if (!context_.sink->take(out)) context_.runs.pop_back();

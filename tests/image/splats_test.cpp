@@ -147,6 +147,35 @@ TEST(Splats, everyReconstructionShowsEllipses) {
     }
 }
 
+// Splats larger than their distance begin behind the eye and end far before it.
+TEST(Splats, aPlaneIsClosedFromJustAboveIt) {
+    ThreadPool pool(2);
+    const Scene source = sourceOf(makePrimitive("plane", 2, Vec3(0.8f, 0.5f, 0.3f)));
+    SplatReport report;
+    const Scene model = modelOf(source, optionsOf(0.5, false, 20000), pool, report);
+    EXPECT_LT(report.splats, 1000);
+    for (const double height : {0.003, 0.03, 0.1}) {
+        const Camera camera = lookAt(DVec3(0.02, height, 0.03), DVec3(0.3, 0.0, -0.3));
+        const Image rays = draw(source, camera, 128, Method::kRaycast, 16, pool);
+        const int covered = rays.channelIndex("coverage");
+        for (const Reconstruct reconstruct : kReconstructions) {
+            const Image image = draw(model, camera, 128, Method::kPoints, 1, pool, 2, reconstruct);
+            int open = 0, beyond = 0;
+            for (int y = 0; y < 128; ++y) {
+                for (int x = 0; x < 128; ++x) {
+                    const float of_plane = rays.pixel(x, y)[covered],
+                                shown = image.pixel(x, y)[image.channelIndex("coverage")];
+                    open += of_plane >= 1.0f && shown < 0.5f;
+                    // Splats reach beyond the plane's borders, but not above the horizon.
+                    beyond += y < 20 && of_plane <= 0.0f && shown > 0.0f;
+                }
+            }
+            EXPECT_EQ(open, 0) << height << " " << int(reconstruct);
+            EXPECT_EQ(beyond, 0) << height << " " << int(reconstruct);
+        }
+    }
+}
+
 // A scan from 100 directions: no hole, alike in the mean, and fewer ellipses than circles. The
 // worst views, near and above, show flat facets: they are not alike yet, and must not become worse.
 TEST(Splats, aScanIsClosedFromAbove) {
