@@ -252,11 +252,15 @@ std::string inQuotes(std::string_view text) {
 std::string nameHint(const std::string& name, const std::vector<std::string>& known) {
     const std::string nearest = nearestName(name, known);
     if (!nearest.empty()) return "; did you mean " + inQuotes(nearest) + "?";
-    constexpr size_t kFew = 8;
-    if (known.empty() || known.size() > kFew) return "";
+    // Alternatives of a schema have keys in common.
+    std::vector<std::string> names;
+    for (const std::string& k : known)
+        if (std::find(names.begin(), names.end(), k) == names.end()) names.push_back(k);
+    constexpr size_t kFew = 16;
+    if (names.empty() || names.size() > kFew) return "";
     std::string list = "; known: ";
-    for (size_t i = 0; i < known.size(); ++i)
-        list += (i == 0 ? "" : i + 1 == known.size() ? " and " : ", ") + inQuotes(known[i]);
+    for (size_t i = 0; i < names.size(); ++i)
+        list += (i == 0 ? "" : i + 1 == names.size() ? " and " : ", ") + inQuotes(names[i]);
     return list;
 }
 
