@@ -2,6 +2,7 @@
 #include <scenegraph/io/splat_cloud.h>
 
 #include <core/error.h>
+#include <scenegraph/io/splat_border.h>
 #include <scenegraph/io/splat_choice.h>
 #include <scenegraph/io/splat_pack.h>
 
@@ -240,8 +241,11 @@ SurfelModel SplatCloud::model() const {
     if (bounds.isEmpty())
         throw Error(ErrorCode::kInvalidScene, "", "a cloud has no points to make splats of");
     std::vector<Splat> splats;
+    std::vector<NearPoint> near;
     for (const Placed& placed : splats_) {
-        if (placed.n_points > 0) splats.push_back(placed.splat);
+        if (placed.n_points == 0) continue;
+        splats.push_back(placed.splat);
+        if (rules_.has_cuts) cutAtBorders(points_, index_, near, splats.back());
     }
     SurfelFinish finish = finish_;
     finish.patch_width = float(glm::length(bounds.extent()));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Surface splats from point clouds: as few ellipses as cover all points within a tolerance, closed
-// over the gaps between the points, and cut at creases. Based on: Wu, Kobbelt. Optimized
-// Sub-Sampling of Point Sets for Surface Splatting. 2004; Johnson. Point-based Graphics for
-// Estimated Surfaces.
+// over the gaps between the points, and cut at creases and borders. Based on: Wu, Kobbelt.
+// Optimized Sub-Sampling of Point Sets for Surface Splatting. 2004; Johnson. Point-based Graphics
+// for Estimated Surfaces.
 #pragma once
 
 #include <core/parallel.h>
@@ -20,7 +20,7 @@ struct SplatOptions {
     int neighbours = 12;            // that a point's plane is fitted to
     int points = 200000;            // taken on meshes; clouds are taken as they are
     bool are_circles = false;       // instead of ellipses along the principal curvatures
-    bool has_cuts = true;           // lines that cut splats at creases
+    bool has_cuts = true;           // lines that cut splats at creases and borders
     bool relax = true;              // leave splats out whose points others cover
     bool naive = false;             // one splat a point, for comparison
 };

@@ -110,28 +110,55 @@ TEST(Splats, edgesOfABoxStaySharp) {
     }
 }
 
-// What is drawn for a splat ends at the edges, but for the tolerance and the steps of positions.
-TEST(Splats, nothingReachesBeyondABox) {
-    ThreadPool pool(2);
-    const Scene source = sourceOf(box());
-    const CancelFlag cancel;
-    SplatReport report;
-    const SurfelModel model = buildSplats(
-        source, optionsOf(0.1, false), pool, cancel, [](double) {}, report);
+// The farthest that anything drawn for a splat reaches from the middle along an axis.
+float reachOf(const SurfelModel& model) {
     const SurfelLevel& level = model.levels[0];
-    const float slack = float(3.0 * report.tolerance);
+    float reach = 0.0f;
     std::array<Vec3, kMostDiscCorners> corners;
     for (const SurfelBlock& block : level.blocks) {
         for (uint32_t i = block.first; i < block.first + block.count; ++i) {
             const Surfel s = unpackSurfel(level, block, i);
             const int n =
                 discPolygon(level, s, kDiscSide * level.spacing * s.radius_share, corners);
-            ASSERT_GE(n, 3);
+            EXPECT_GE(n, 3) << "splat " << i;
             for (int c = 0; c < n; ++c) {
                 const Vec3 p = glm::abs(s.position + corners[size_t(c)]);
-                EXPECT_LE(std::max({p.x, p.y, p.z}), 0.5f + slack) << "splat " << i;
+                reach = std::max({reach, p.x, p.y, p.z});
             }
         }
+    }
+    return reach;
+}
+
+// At edges, but for the tolerance and the steps of positions.
+TEST(Splats, nothingReachesBeyondABox) {
+    ThreadPool pool(2);
+    const CancelFlag cancel;
+    SplatReport report;
+    const SurfelModel model = buildSplats(
+        sourceOf(box()), optionsOf(0.1, false), pool, cancel, [](double) {}, report);
+    EXPECT_LE(reachOf(model), 0.5f + float(3.0 * report.tolerance));
+}
+
+// Where points end, splats end: a few spacings beyond, not half their width.
+TEST(Splats, nothingReachesFarBeyondABorder) {
+    ThreadPool pool(2);
+    const CancelFlag cancel;
+    const Scene source = sourceOf(makePrimitive("plane", 2, Vec3(0.8f, 0.5f, 0.3f)));
+    constexpr int kPoints = 20000;
+    const float spacing = 1.0f / std::sqrt(float(kPoints));
+    for (const bool has_cuts : {false, true}) {
+        SplatOptions options = optionsOf(0.1, false, kPoints);
+        options.has_cuts = has_cuts;
+        SplatReport report;
+        const SurfelModel model = buildSplats(
+            source, options, pool, cancel, [](double) {}, report);
+        EXPECT_LT(report.splats, kPoints / 50);
+        const float beyond = (reachOf(model) - 0.5f) / spacing;
+        if (has_cuts)
+            EXPECT_LE(beyond, 4.0f);
+        else
+            EXPECT_GE(beyond, 8.0f);
     }
 }
 
