@@ -95,24 +95,27 @@ inline Ellipse makeEllipse(const View& view, const Vec3& p, const DiscShape& sha
     return e;
 }
 
-// Where a disc with cuts has surface in the picture.
-class CutTest {
+// Places on a disc with a shape, by where they are in the picture.
+class DiscPlaces {
 public:
-    CutTest(const View& view, const Vec3& p, const DiscShape& shape)
+    DiscPlaces(const View& view, const Vec3& p, const DiscShape& shape)
         : view_(view), p_(p), shape_(shape) {
-        if (shape.n_cuts == 0) return;
         const Vec3 n = glm::cross(shape.axis[0], shape.axis[1]);
         const float squared = glm::dot(n, n);
         across_[0] = glm::cross(shape.axis[1], n) / squared;
         across_[1] = glm::cross(n, shape.axis[0]) / squared;
     }
-    // x, y: subpixel coordinates; depth: of the disc's plane there.
-    bool hasSurface(float x, float y, float depth) const {
-        if (shape_.n_cuts == 0) return true;
+    // u and v. x, y: subpixel coordinates; depth: of the disc's plane there.
+    Vec2 at(float x, float y, float depth) const {
         Vec3 origin, direction;
         view_.ray(x, y, origin, direction);
         const Vec3 d = origin + direction * depth - p_;
-        return shape_.hasSurface(glm::dot(d, across_[0]), glm::dot(d, across_[1]));
+        return Vec2(glm::dot(d, across_[0]), glm::dot(d, across_[1]));
+    }
+    bool hasSurface(float x, float y, float depth) const {
+        if (shape_.n_cuts == 0) return true;
+        const Vec2 uv = at(x, y, depth);
+        return shape_.hasSurface(uv.x, uv.y);
     }
 
 private:

@@ -150,13 +150,13 @@ private:
         const SubpixelRect& rect = front_.rect();
         const Variance v =
             e.unit.times(areaOf(block, i, e) * (kDiscArea / kPi)).plus(kLeastRadius * kLeastRadius);
-        const CutTest cut(context_.view, position(block, i),
-                          block.shapes ? block.shapes[i] : kCircle);
+        const DiscPlaces disc(context_.view, position(block, i),
+                              block.shapes ? block.shapes[i] : kCircle);
         visitEllipse(e.center, v, 1.0f, rect.x0, rect.y0, rect.x1, rect.y1,
                      [&](int x, int y, const Vec2& d, float) {
                          const float depth = planeDepth(context_.view, e, d);
                          if (!(depth < kInfinity) ||
-                             !cut.hasSurface(e.center.x + d.x, e.center.y + d.y, depth))
+                             !disc.hasSurface(e.center.x + d.x, e.center.y + d.y, depth))
                              return;
                          uint64_t& key = front_.row(y)[x];
                          const uint64_t of_disc = pointKey(block, i, depth);
@@ -186,16 +186,24 @@ private:
             block.is_coarse ? std::max(block.width[i], kSurfaceCode) : block.width[i];
         SurfaceSample sample;
         bool is_looked_up = false;
-        const auto add = [&](int x, int y, const Vec2& p, float weight, float area) {
-            if (!is_looked_up) {
-                sample.depth = block.z[i];
-                sample.position_camera = position(block, i);
+        // How the normal turns along the half axes of a shape, a metre.
+        std::array<Vec3, 2> turn = {Vec3(0), Vec3(0)};
+        const auto lookUp = [&](const Vec2& p, float step) {
+            sample.depth = block.z[i];
+            for (size_t k = 0; block.shapes && k < 2; ++k) {
+                sample.position_camera = position(block, i) + block.shapes[i].axis[k] * step;
                 lookup_->lookUp(block.number[i], p.x, p.y, sample);
-                is_looked_up = true;
+                turn[k] = sample.normal_world / step;
             }
+            sample.position_camera = position(block, i);
+            lookup_->lookUp(block.number[i], p.x, p.y, sample);
+            for (Vec3& t : turn) t -= block.shapes ? sample.normal_world / step : t;
+            is_looked_up = true;
+        };
+        const auto add = [&](int x, int y, const Vec3& normal, float weight, float area) {
             Gathered& sum = gathered(x, y);
             sum.albedo += sample.albedo * weight;
-            sum.normal += sample.normal_world * weight;
+            sum.normal += normal * weight;
             sum.weight += weight;
             sum.area += area;
         };
@@ -205,7 +213,9 @@ private:
                   p.y < float(inner_.y1)))
                 return;
             const int x = int(p.x), y = int(p.y);
-            if (isOnFront(block.z[i], front_.row(y)[x], code)) add(x, y, p, 1.0f, 0.0f);
+            if (!isOnFront(block.z[i], front_.row(y)[x], code)) return;
+            lookUp(p, 1.0f);
+            add(x, y, sample.normal_world, 1.0f, 0.0f);
             return;
         }
         const Ellipse e = ellipseOf(block, i);
@@ -213,19 +223,25 @@ private:
         const Variance v = e.unit.times(kSplatSigma * kSplatSigma * world_area).plus(prefilter_);
         const float area = world_area * std::sqrt(std::max(e.unit.determinant(), 0.0f));
         const float scale = area / kernelIntegral(v);
-        const Variance disc = e.unit.times(world_area * (kDiscArea / kPi));
-        const CutTest cut(context_.view, position(block, i),
-                          block.shapes ? block.shapes[i] : kCircle);
+        const Variance whole = e.unit.times(world_area * (kDiscArea / kPi));
+        const DiscPlaces disc(context_.view, position(block, i),
+                              block.shapes ? block.shapes[i] : kCircle);
         visitEllipse(e.center, v, kKernelEnd, inner_.x0, inner_.y0, inner_.x1, inner_.y1,
                      [&](int x, int y, const Vec2& d, float r) {
                          const float depth = planeDepth(context_.view, e, d);
                          if (!(depth < kInfinity) || !isOnFront(depth, front_.row(y)[x], code) ||
-                             !cut.hasSurface(e.center.x + d.x, e.center.y + d.y, depth))
+                             !disc.hasSurface(e.center.x + d.x, e.center.y + d.y, depth))
                              return;
                          const float w = scale * kernel(r);
                          // Discs with shapes end where the surface does.
-                         const bool is_surface = block.shapes && disc.measure(d) < 1.0f;
-                         add(x, y, e.center, w, is_surface ? 1.0f : w);
+                         const bool is_surface = block.shapes && whole.measure(d) < 1.0f;
+                         if (!is_looked_up) lookUp(e.center, 0.2f * std::sqrt(world_area));
+                         Vec3 normal = sample.normal_world;
+                         if (block.shapes) {
+                             const Vec2 uv = disc.at(e.center.x + d.x, e.center.y + d.y, depth);
+                             normal += turn[0] * uv.x + turn[1] * uv.y;
+                         }
+                         add(x, y, normal, w, is_surface ? 1.0f : w);
                      });
     }
 

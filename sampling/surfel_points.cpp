@@ -9,6 +9,7 @@
 #include <scenegraph/object_id.h>
 #include <scenegraph/surface_at.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace stipple {
@@ -91,6 +92,7 @@ struct SurfelPoints::Placed {
     uint32_t mesh = 0;
     int level_index = 0;
     float length_scale = 1.0f;
+    uint32_t frame_index = kNoFrame;
     std::array<int, 256> width_codes = {};  // of finishes, in metres of camera space
     ModelEye eye;
 };
@@ -126,8 +128,13 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     while (l > 0 && model.levels[size_t(l)].spacing * per_metre > wanted) --l;
     const SurfelLevel& level = model.levels[size_t(l)];
     const bool may_be_discs = !context_.sink->wantsSurfels();
-    Placed placed{frame, model, level, mesh_index,
-                  l,     scale, {},    makeModelEye(frame, model, view.orthographic)};
+    Placed placed{frame,      model, level,
+                  mesh_index, l,     scale,
+                  kNoFrame,   {},    makeModelEye(frame, model, view.orthographic)};
+    if (!level.bends.empty()) {
+        placed.frame_index = uint32_t(context_.frames.size());
+        context_.frames.push_back(frame);
+    }
     for (size_t i = 0; i < model.finishes.size(); ++i) {
         placed.width_codes[i] =
             int(patchWidthCode(model.finishes[i].patch_width * scale, kFirstMetreExponent));
@@ -169,6 +176,7 @@ uint32_t SurfelPoints::addRun(const Placed& placed, uint32_t first, int numbers_
     run.child = ChildRef::mesh(placed.mesh);
     run.first_index = first;
     run.path = placed.frame.path;
+    run.frame = placed.frame_index;
     run.surfel_level = int16_t(placed.level_index);
     run.numbers_per_surfel_shift = uint8_t(numbers_shift);
     context_.runs.push_back(run);
@@ -362,8 +370,26 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
     }
 }
 
-void surfelAttributes(const Scene& scene, const Mat3& world_from_camera, const Run& run,
+namespace {
+
+// Object space, unit.
+Vec3 normalAt(const TileContext& context, const SurfelModel& model, const SurfelLevel& level,
+              const Run& run, uint32_t index, const Vec3& position_camera) {
+    if (run.frame == kNoFrame) return unpackNormal16(level.normal[index]);
+    const auto after =
+        std::upper_bound(level.blocks.begin(), level.blocks.end(), index,
+                         [](uint32_t i, const SurfelBlock& block) { return i < block.first; });
+    const Surfel s = unpackSurfel(level, *(after - 1), index);
+    const Affine& to_camera = context.frames[run.frame].camera_from_object;
+    const DVec3 offset = DVec3(position_camera) - to_camera.point(DVec3(s.position));
+    return bentNormal(level, s, model.discSide(), Vec3(glm::inverse(to_camera.linear) * offset));
+}
+
+}  // namespace
+
+void surfelAttributes(const TileContext& context, const Mat3& world_from_camera, const Run& run,
                       uint32_t index, SurfaceSample& sample) {
+    const Scene& scene = context.scene;
     const Mesh& mesh = scene.meshes[run.child.index()];
     const SurfelLevel& level = mesh.surfels->levels[size_t(run.surfel_level)];
     const uint32_t bits = level.albedo_finish[index];
@@ -378,8 +404,8 @@ void surfelAttributes(const Scene& scene, const Mat3& world_from_camera, const R
     sample.patch_width =
         std::max(mesh.surfels->finishes[finish].patch_width, side) * run.length_scale;
     sample.object = objectId(run.path);
-    sample.normal_world = glm::normalize(
-        world_from_camera * (run.camera_from_normal * unpackNormal16(level.normal[index])));
+    const Vec3 normal = normalAt(context, *mesh.surfels, level, run, index, sample.position_camera);
+    sample.normal_world = glm::normalize(world_from_camera * (run.camera_from_normal * normal));
 }
 
 }  // namespace stipple

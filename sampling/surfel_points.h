@@ -37,8 +37,8 @@ private:
     std::array<Vec3, kBlockSurfels> planes_;
 };
 
-// Attributes of a surfel of a run (Run::surfel_level).
-void surfelAttributes(const Scene& scene, const Mat3& world_from_camera, const Run& run,
+// Attributes of a surfel of a run (Run::surfel_level) at sample.position_camera.
+void surfelAttributes(const TileContext& context, const Mat3& world_from_camera, const Run& run,
                       uint32_t index, SurfaceSample& sample);
 
 }  // namespace stipple

@@ -11,7 +11,7 @@
 
 namespace stipple {
 
-inline constexpr uint32_t kNotTriangles = 0xffffffffu;
+inline constexpr uint32_t kNoFrame = 0xffffffffu;
 
 // What attributes() must know of 64 consecutive numbers.
 struct Run {
@@ -22,9 +22,10 @@ struct Run {
     int direction = ListName::kWhole;  // of the node's list
     uint32_t first_index = 0;          // of the node's list, or of the mesh's triangles
     uint32_t list_length = 0;
-    uint64_t path = 0;                        // of the mesh's or the group's instance
-    uint32_t triangle_frame = kNotTriangles;  // index into triangle_frames
-    int16_t surfel_level = -1;                // of a prebuilt model's surfels, from first_index on
+    uint64_t path = 0;  // of the mesh's or the group's instance
+    // Index into frames: of triangles of a mesh, and of surfels whose normals turn.
+    uint32_t frame = kNoFrame;
+    int16_t surfel_level = -1;             // of a prebuilt model's surfels, from first_index on
     uint8_t numbers_per_surfel_shift = 0;  // 1: a surfel has two numbers, of its disc's triangles
 };
 
@@ -35,7 +36,7 @@ struct TileContext {
     PointLists& lists;
     PointSink* sink = nullptr;
     std::vector<Run> runs;
-    std::vector<InstanceFrame> triangle_frames;
+    std::vector<InstanceFrame> frames;
 
     // Below kSurfaceBit; the one thing that may throw while a tile is drawn.
     uint32_t nextNumber() const {

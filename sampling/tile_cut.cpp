@@ -41,14 +41,13 @@ void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSampl
     const Run& run = context_.runOf(number);
     if (run.surfel_level >= 0) {
         const uint32_t place = (number % kBlockPoints) >> run.numbers_per_surfel_shift;
-        surfelAttributes(context_.scene, world_from_camera_, run, run.first_index + place, sample);
+        surfelAttributes(context_, world_from_camera_, run, run.first_index + place, sample);
         return;
     }
     const uint32_t index = run.first_index + number % kBlockPoints;
-    if (run.triangle_frame != kNotTriangles) {
-        triangleAttributes(context_.scene, context_.view,
-                           context_.triangle_frames[run.triangle_frame], run.child.index(), index,
-                           sub_x, sub_y, sample);
+    if (run.frame != kNoFrame) {
+        triangleAttributes(context_.scene, context_.view, context_.frames[run.frame],
+                           run.child.index(), index, sub_x, sub_y, sample);
         return;
     }
     int lane;
@@ -60,7 +59,7 @@ void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSampl
 
 void TileCut::forget() {
     context_.runs.clear();
-    context_.triangle_frames.clear();
+    context_.frames.clear();
     points_.flush();
 }
 
@@ -172,7 +171,7 @@ void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& c
         }
         seen.direction = ListName::kWhole;
     }
-    uint32_t triangle_frame = kNotTriangles;
+    uint32_t triangle_frame = kNoFrame;
     drawMeshNode(frame, mesh_index, seen, node_index, box, triangle_frame);
 }
 
@@ -206,7 +205,7 @@ RunDensity TileCut::meshDensity(const InstanceFrame& frame, const BoxProjection&
 }
 
 // The cut through a mesh's octree. triangle_frame: where the instance stands in
-// context.triangle_frames, once it does.
+// context.frames, once it does.
 void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, const SeenMesh& seen,
                            uint32_t node_index, const BoxProjection& box,
                            uint32_t& triangle_frame) {
@@ -227,9 +226,9 @@ void TileCut::drawMeshNode(const InstanceFrame& frame, uint32_t mesh_index, cons
             return;
         }
         case NodeClass::kTriangles:
-            if (triangle_frame == kNotTriangles) {
-                triangle_frame = uint32_t(context_.triangle_frames.size());
-                context_.triangle_frames.push_back(frame);
+            if (triangle_frame == kNoFrame) {
+                triangle_frame = uint32_t(context_.frames.size());
+                context_.frames.push_back(frame);
             }
             points_.flush();
             triangles_.add(mesh_index, node_index, triangle_frame);

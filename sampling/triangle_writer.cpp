@@ -89,7 +89,7 @@ private:
 };
 
 void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t triangle_frame) {
-    const InstanceFrame& frame = context_.triangle_frames[triangle_frame];
+    const InstanceFrame& frame = context_.frames[triangle_frame];
     const Mesh& mesh = context_.scene.meshes[mesh_index];
     const MeshNode& node = mesh.nodes[node_index];
     const Stratum& stratum = mesh.strata[node.stratum];
@@ -120,7 +120,7 @@ void TriangleWriter::add(uint32_t mesh_index, uint32_t node_index, uint32_t tria
         Run run;
         run.child = ChildRef::mesh(mesh_index);
         run.first_index = node.first_triangle + first;
-        run.triangle_frame = triangle_frame;
+        run.frame = triangle_frame;
         run.path = frame.path;
         context_.runs.push_back(run);
         if (!stratum.double_sided) dropBackFaces(frame, block);

@@ -11,7 +11,7 @@ class TriangleWriter {
 public:
     explicit TriangleWriter(TileContext& context) : context_(context) {}
 
-    // The triangles of a leaf of a mesh. triangle_frame: index into context.triangle_frames.
+    // The triangles of a leaf of a mesh. triangle_frame: index into context.frames.
     void add(uint32_t mesh, uint32_t node, uint32_t triangle_frame);
 
 private:

@@ -98,7 +98,8 @@ size_t SurfelModel::bytes() const {
     for (const SurfelLevel& level : levels) {
         sum += level.blocks.size() * sizeof(SurfelBlock) + level.radius.size() +
                level.size() * (2 * sizeof(uint32_t) + sizeof(uint16_t)) +
-               level.shapes.size() * sizeof(SurfelShape) + level.cuts.size() * sizeof(SurfelCut);
+               level.shapes.size() * sizeof(SurfelShape) + level.cuts.size() * sizeof(SurfelCut) +
+               level.bends.size() * sizeof(SurfelBend);
     }
     return sum;
 }
@@ -183,6 +184,16 @@ void unpackShape(const SurfelLevel& level, uint32_t index, Surfel& s) {
     }
 }
 
+constexpr float kBendSteps = 64.0f;
+
+SurfelBend packBend(const Surfel& s) {
+    SurfelBend bend;
+    for (int k = 0; k < 3; ++k)
+        bend.slopes[size_t(k)] =
+            int8_t(std::lround(std::clamp(s.bend[k] * kBendSteps, -127.0f, 127.0f)));
+    return bend;
+}
+
 uint64_t interleave(uint32_t x, uint32_t y, uint32_t z) {
     return spreadBits(x) << 2 | spreadBits(y) << 1 | spreadBits(z);
 }
@@ -248,11 +259,15 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
                 position |= uint32_t(std::clamp(q, 0.0f, 1.0f) * steps + 0.5f) << kPositionShift[a];
             }
             level.position.push_back(position);
-            level.normal.push_back(packNormal16(s.normal));
+            const bool has_shape = discs == SurfelDiscs::kShapes;
+            level.normal.push_back(packNormal16(has_shape ? s.shading_normal : s.normal));
             level.albedo_finish.push_back(packSrgb8(s.albedo) | uint32_t(s.finish) << 24);
             if (discs != SurfelDiscs::kAlike)
                 level.radius.push_back(surfelRadiusCode(s.radius_share));
-            if (discs == SurfelDiscs::kShapes) level.shapes.push_back(packShape(s, level.cuts));
+            if (has_shape) {
+                level.shapes.push_back(packShape(s, level.cuts));
+                level.bends.push_back(packBend(s));
+            }
         }
         level.blocks.push_back(block);
         begin = end;
@@ -271,8 +286,24 @@ Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t
     s.albedo = unpackSrgb8(bits);
     s.finish = uint8_t(bits >> 24);
     s.radius_share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[i]);
+    s.shading_normal = s.normal;
     if (!level.shapes.empty()) unpackShape(level, i, s);
+    if (!level.bends.empty()) {
+        for (int k = 0; k < 3; ++k)
+            s.bend[k] = float(level.bends[i].slopes[size_t(k)]) / kBendSteps;
+    }
     return s;
+}
+
+Vec3 bentNormal(const SurfelLevel& level, const Surfel& s, float side, const Vec3& offset) {
+    const Vec3 across = glm::cross(s.normal, s.along);
+    const float long_axis =
+        level.spacing * s.radius_share * side / (kSidePerRadius * std::sqrt(s.ratio));
+    Vec2 p = Vec2(glm::dot(offset, s.along), glm::dot(offset, across)) / long_axis;
+    const float beyond = std::sqrt(p.x * p.x + p.y * p.y / (s.ratio * s.ratio));
+    if (beyond > 1.0f) p /= beyond;
+    return glm::normalize(s.shading_normal + s.along * (s.bend.x * p.x + s.bend.z * p.y) +
+                          across * (s.bend.z * p.x + s.bend.y * p.y));
 }
 
 namespace {
@@ -359,7 +390,8 @@ void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes
         const size_t n = level.size();
         check(level.normal.size() == n && level.albedo_finish.size() == n &&
                   (level.radius.empty() || level.radius.size() == n) &&
-                  (level.shapes.empty() || (level.shapes.size() == n && !level.radius.empty())),
+                  (level.shapes.empty() || (level.shapes.size() == n && !level.radius.empty())) &&
+                  (level.bends.empty() || level.bends.size() == level.shapes.size()),
               where, "has arrays of different lengths");
         for (const SurfelShape& shape : level.shapes) {
             check(shape.ratio > 0, where, "has a splat that is a line");

@@ -63,7 +63,15 @@ static_assert(sizeof(SurfelCut) == 4);
 
 inline constexpr int kMostSurfelCuts = 4;
 
-// One density: as structure of arrays, 10 bytes a surfel, 11 with radii of their own, 23 and 4 a
+// How the shading normal turns over a splat: by so many 64ths of a radian a long half axis, about.
+// (xx, yy, xy): its part along the long half axis changes by xx along it and xy across, its part
+// across by xy and yy. Based on: Botsch, Spernat, Kobbelt. Phong Splatting. 2004.
+struct SurfelBend {
+    std::array<int8_t, 3> slopes = {0, 0, 0};
+};
+static_assert(sizeof(SurfelBend) == 3);
+
+// One density: as structure of arrays, 10 bytes a surfel, 11 with radii of their own, 26 and 4 a
 // cut with shapes.
 struct SurfelLevel {
     float spacing = 1.0f;  // object space, m: no point of the surface is farther from a surfel
@@ -71,10 +79,12 @@ struct SurfelLevel {
     std::vector<uint32_t> position;  // packed, in steps of the block's extent
     std::vector<uint16_t> normal;    // octahedral, 2 x 8 bits
     std::vector<uint32_t>
-        albedo_finish;                // sRGB-encoded 3 x 8 bits; index of the finish in the top 8
-    std::vector<uint8_t> radius;      // surfelRadius() codes; empty: spacing holds for all
-    std::vector<SurfelShape> shapes;  // empty: circles; else radii are of circles as large
+        albedo_finish;            // sRGB-encoded 3 x 8 bits; index of the finish in the top 8
+    std::vector<uint8_t> radius;  // surfelRadius() codes; empty: spacing holds for all
+    // Empty: circles; else radii are of circles as large, and `normal` is for shading alone.
+    std::vector<SurfelShape> shapes;
     std::vector<SurfelCut> cuts;
+    std::vector<SurfelBend> bends;  // of shapes; empty: all are flat
 
     size_t size() const { return position.size(); }
     static Vec3 step(const SurfelBlock& block) {
@@ -131,6 +141,9 @@ struct Surfel {
     float ratio = 1.0f;
     int n_cuts = 0;
     std::array<Vec3, kMostSurfelCuts> cuts = {};
+    // Of shapes: the shading normal at the centre, and SurfelBend's slopes a long half axis.
+    Vec3 shading_normal = Vec3(0, 0, 1);
+    Vec3 bend = Vec3(0);
 
     // Half axes of a disc that is as large as a circle of radius 1.
     std::array<Vec3, 2> axes() const {
@@ -147,6 +160,9 @@ enum class SurfelDiscs { kAlike, kRadii, kShapes };
 SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
                         float spacing, SurfelDiscs discs);
 Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t index);
+// The unit shading normal of a surfel of a level with bends at an offset from its centre, object
+// space; beyond its ellipse as at its rim. side: SurfelModel::discSide().
+Vec3 bentNormal(const SurfelLevel& level, const Surfel& surfel, float side, const Vec3& offset);
 
 // A disc of a shape is as large as that of a square with sides of this many radii.
 inline constexpr float kSidePerRadius = 1.8f;

@@ -68,7 +68,7 @@ void transferModel(Stream& stream, std::string& kind, HybridModel& model) {
             stream.array(level.triangles);
             stream.array(level.material);
         });
-        transferLevels(stream, patch.surfels, false);
+        transferLevels(stream, patch.surfels, kHybridVersion);
     });
 }
 

@@ -40,10 +40,10 @@ ModelBody modelBody(const std::string& text, const std::string& where) {
     if (text.size() < sizeof header || std::memcmp(text.data(), kMagic, sizeof kMagic) != 0)
         throw Error(ErrorCode::kParse, where, "is no model made by 'stipple build'");
     std::memcpy(&header, text.data(), sizeof header);
-    if (header.version < kSurfelVersion || header.version > kShapeVersion || header.flags != 0) {
+    if (header.version < kSurfelVersion || header.version > kBendVersion || header.flags != 0) {
         throw Error(ErrorCode::kUnsupported, where,
                     "has version " + std::to_string(header.version) + "; this program reads " +
-                        std::to_string(kSurfelVersion) + " to " + std::to_string(kShapeVersion));
+                        std::to_string(kSurfelVersion) + " to " + std::to_string(kBendVersion));
     }
     const size_t size = text.size() - sizeof header;
     if (header.size != size) {

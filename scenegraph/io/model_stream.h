@@ -16,8 +16,10 @@ namespace stipple {
 
 static_assert(std::endian::native == std::endian::little, "model files are little-endian");
 
-// Of the file's layout: surfels that are alike or circles, hybrids, splats with shapes.
-inline constexpr uint32_t kSurfelVersion = 1, kHybridVersion = 2, kShapeVersion = 3;
+// Of the file's layout: surfels that are alike or circles, hybrids, splats with shapes, these with
+// normals that turn.
+inline constexpr uint32_t kSurfelVersion = 1, kHybridVersion = 2, kShapeVersion = 3,
+                          kBendVersion = 4;
 
 // The whole file: header and body.
 std::string modelFileText(uint32_t version, const std::string& body);
@@ -137,7 +139,7 @@ void transferBlock(Stream& stream, SurfelBlock& b) {
 }
 
 template <class Stream>
-void transferLevels(Stream& stream, std::vector<SurfelLevel>& levels, bool with_shapes) {
+void transferLevels(Stream& stream, std::vector<SurfelLevel>& levels, uint32_t version) {
     constexpr size_t kLeastLevel = 44, kBlock = 76;
     stream.list(levels, kLeastLevel, [&](SurfelLevel& level) {
         stream.value(level.spacing);
@@ -147,10 +149,11 @@ void transferLevels(Stream& stream, std::vector<SurfelLevel>& levels, bool with_
         stream.array(level.normal);
         stream.array(level.albedo_finish);
         stream.array(level.radius);
-        if (with_shapes) {
+        if (version >= kShapeVersion) {
             stream.array(level.shapes);
             stream.array(level.cuts);
         }
+        if (version >= kBendVersion) stream.array(level.bends);
     });
 }
 

@@ -156,7 +156,8 @@ std::vector<ChosenSplat> splatEachPoint(const SplatPoints& points) {
                       .short_radius = p.spacing,
                       .gap = 0.8f * p.spacing,
                       .color = p.color,
-                      .finish = p.finish},
+                      .finish = p.finish,
+                      .shading_normal = p.normal},
                      {i}};
     }
     return splats;

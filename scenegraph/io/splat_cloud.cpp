@@ -2,6 +2,7 @@
 #include <scenegraph/io/splat_cloud.h>
 
 #include <core/error.h>
+#include <scenegraph/io/splat_bend.h>
 #include <scenegraph/io/splat_border.h>
 #include <scenegraph/io/splat_choice.h>
 #include <scenegraph/io/splat_pack.h>
@@ -242,9 +243,12 @@ SurfelModel SplatCloud::model() const {
         throw Error(ErrorCode::kInvalidScene, "", "a cloud has no points to make splats of");
     std::vector<Splat> splats;
     std::vector<NearPoint> near;
+    std::vector<uint32_t> covered;
     for (const Placed& placed : splats_) {
         if (placed.n_points == 0) continue;
         splats.push_back(placed.splat);
+        findCovered(placed.splat, points_, index_, rules_, near, covered);
+        bendNormals(points_, covered, splats.back());
         if (rules_.has_cuts) cutAtBorders(points_, index_, near, splats.back());
     }
     SurfelFinish finish = finish_;

@@ -233,7 +233,7 @@ Splat SplatGrower::grow(uint32_t seed, size_t most) {
     }
     if (rules_.has_cuts) cutRim(best, seed);
     Splat splat;
-    splat.normal = best.frame.normal;
+    splat.normal = splat.shading_normal = best.frame.normal;
     splat.center = best.frame.origin + splat.normal * (0.5f * (best.lowest + best.highest));
     splat.along = best.frame.along;
     splat.long_radius = best.radius / std::sqrt(best.frame.ratio);

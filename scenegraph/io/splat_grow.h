@@ -29,6 +29,9 @@ struct Splat {
     Vec3 color = Vec3(0);
     uint8_t finish = 0;
     int n_cuts = 0;
+    // The shading normal in its middle, and by how much its parts along and across turn a metre:
+    // (xx, yy, xy) as in SurfelBend.
+    Vec3 shading_normal = Vec3(0, 0, 1), bend = Vec3(0);
     // Nothing where x a + y b > z, a along, b across; (x, y) unit, z in m, not negative.
     std::array<Vec3, kMostCuts> cuts = {};
 

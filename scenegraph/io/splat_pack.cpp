@@ -24,9 +24,11 @@ Surfel surfelOf(const Splat& splat, float spacing) {
     s.along = splat.along;
     s.ratio = quantizedRatio(long_radius > 0.0f ? short_radius / long_radius : 1.0f);
     s.n_cuts = splat.n_cuts;
+    s.shading_normal = splat.shading_normal;
     // Of the half axis that the model will have: radii are rounded up.
     const float kept_radius = surfelRadius(surfelRadiusCode(s.radius_share)) * spacing /
                               kSharePerRadius / std::sqrt(s.ratio);
+    s.bend = splat.bend * kept_radius;
     for (int i = 0; i < splat.n_cuts; ++i) {
         const Vec3& cut = splat.cuts[size_t(i)];
         s.cuts[size_t(i)] = Vec3(cut.x, cut.y, cut.z / std::max(kept_radius, 1e-30f));

@@ -4,6 +4,7 @@
 #include <core/image.h>
 #include <core/option_text.h>
 #include <core/stopwatch.h>
+#include <scenegraph/io/splat_bend.h>
 #include <scenegraph/io/splat_border.h>
 #include <scenegraph/io/splat_choice.h>
 #include <scenegraph/io/splat_pack.h>
@@ -77,13 +78,15 @@ public:
         progress_(0.95);
         std::vector<Splat> splats;
         for (const ChosenSplat& s : chosen) splats.push_back(s.splat);
-        if (rules.has_cuts && !options_.naive) {
+        if (!options_.naive) {
             constexpr size_t kChunk = 64;
             pool_.forEach((splats.size() + kChunk - 1) / kChunk, [&](size_t chunk, int) {
                 std::vector<NearPoint> near;
                 for (size_t k = chunk * kChunk; k < std::min(splats.size(), (chunk + 1) * kChunk);
-                     ++k)
-                    cutAtBorders(points_, index, near, splats[k]);
+                     ++k) {
+                    bendNormals(points_, chosen[k].covered, splats[k]);
+                    if (rules.has_cuts) cutAtBorders(points_, index, near, splats[k]);
+                }
             });
         }
         // One surface, whose holes may be closed.

@@ -12,19 +12,24 @@ namespace stipple {
 namespace {
 
 template <class Stream>
-void transferModel(Stream& stream, SurfelModel& model, bool with_shapes) {
+void transferModel(Stream& stream, SurfelModel& model, uint32_t version) {
     stream.string(model.kind);
     stream.string(model.source);
     stream.value(model.bounds.min);
     stream.value(model.bounds.max);
     stream.value(model.area);
     transferFinishes(stream, model.finishes);
-    transferLevels(stream, model.levels, with_shapes);
+    transferLevels(stream, model.levels, version);
 }
 
-bool hasShapes(const SurfelModel& model) {
-    return std::any_of(model.levels.begin(), model.levels.end(),
-                       [](const SurfelLevel& level) { return !level.shapes.empty(); });
+// The oldest that has all of the model.
+uint32_t versionOf(const SurfelModel& model) {
+    uint32_t version = kSurfelVersion;
+    for (const SurfelLevel& level : model.levels) {
+        if (!level.shapes.empty()) version = std::max(version, kShapeVersion);
+        if (!level.bends.empty()) version = std::max(version, kBendVersion);
+    }
+    return version;
 }
 
 }  // namespace
@@ -32,19 +37,19 @@ bool hasShapes(const SurfelModel& model) {
 std::string surfelFileText(const SurfelModel& model) {
     SurfelModel copy = model;
     ModelWriter writer;
-    const bool with_shapes = hasShapes(model);
-    transferModel(writer, copy, with_shapes);
-    return modelFileText(with_shapes ? kShapeVersion : kSurfelVersion, writer.text);
+    const uint32_t version = versionOf(model);
+    transferModel(writer, copy, version);
+    return modelFileText(version, writer.text);
 }
 
 SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
                             const std::string& where) {
     const ModelBody body = modelBody(text, where);
-    if (body.version != kSurfelVersion && body.version != kShapeVersion)
+    if (body.version == kHybridVersion)
         throw Error(ErrorCode::kParse, where, "holds no model of surfels alone");
     SurfelModel model;
     ModelReader reader(body.data, body.size, budget, where);
-    transferModel(reader, model, body.version == kShapeVersion);
+    transferModel(reader, model, body.version);
     if (!reader.isAtEnd()) throw Error(ErrorCode::kParse, where, "has bytes behind its end");
     checkSurfelModel(model, where);
     return model;

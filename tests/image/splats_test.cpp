@@ -169,7 +169,7 @@ TEST(Splats, everyReconstructionShowsEllipses) {
     const Scene model = modelOf(source, optionsOf(0.1, false), pool, report);
     for (const Reconstruct reconstruct : kReconstructions) {
         const Seen seen = lookAround(source, model, 6, pool, reconstruct);
-        EXPECT_GE(seen.worst, 26.0) << int(reconstruct);
+        EXPECT_GE(seen.worst, 41.5) << int(reconstruct);
         EXPECT_EQ(seen.holes, 0u) << int(reconstruct);
     }
 }
@@ -204,7 +204,7 @@ TEST(Splats, aPlaneIsClosedFromJustAboveIt) {
 }
 
 // A scan from 100 directions: no hole, alike in the mean, and fewer ellipses than circles. The
-// worst views, near and above, show flat facets: they are not alike yet, and must not become worse.
+// worst views, near and above, must not become worse.
 TEST(Splats, aScanIsClosedFromAbove) {
     const char* folder = std::getenv("STIPPLE_TEST_DATA");
     if (!folder || !*folder) GTEST_SKIP() << "no test data (STIPPLE_TEST_DATA)";
@@ -226,8 +226,8 @@ TEST(Splats, aScanIsClosedFromAbove) {
         // Not from below, where the scan has holes of its own that flat splats close.
         const Seen seen = lookAround(source, model, 100, pool, reconstruct, -0.2f);
         EXPECT_EQ(seen.holes, 0u) << int(reconstruct);
-        EXPECT_GE(seen.mean, 28.0) << int(reconstruct);
-        EXPECT_GE(seen.worst, 23.5)
+        EXPECT_GE(seen.mean, 31.0) << int(reconstruct);
+        EXPECT_GE(seen.worst, 25.5)
             << int(reconstruct) << ", worst " << seen.worst << " in view " << seen.worst_view;
     }
 }

@@ -50,6 +50,35 @@ SurfelModel build(const Scene& scene, const SplatOptions& options, SplatReport& 
         scene, options, pool, cancel, [](double) {}, report);
 }
 
+// Over the splats of a sphere, half an ellipse from their middles.
+TEST(Splats, normalsTurnWithTheSurface) {
+    SplatOptions options;
+    options.tolerance = 0.4;
+    SplatReport report;
+    const SurfelModel model = build(cloudScene(spherePoints(20000), ""), options, report);
+    EXPECT_LT(report.splats, 400u);
+    const SurfelLevel& level = model.levels[0];
+    ASSERT_EQ(level.bends.size(), level.size());
+    double of_planes = 0.0, of_fields = 0.0;  // degrees
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            const std::array<Vec3, 2> axes = s.axes();
+            for (const Vec3& axis : {axes[0], -axes[0], axes[1], -axes[1]}) {
+                const Vec3 offset = axis * (0.5f * level.spacing * s.radius_share);
+                const Vec3 is = glm::normalize(s.position + offset);
+                const Vec3 field = bentNormal(level, s, model.discSide(), offset);
+                const double degrees = 180.0 / kPi;
+                of_planes += std::acos(std::min(glm::dot(s.normal, is), 1.0f)) * degrees;
+                of_fields += std::acos(std::min(glm::dot(field, is), 1.0f)) * degrees;
+            }
+        }
+    }
+    const double n = 4.0 * double(level.size());
+    EXPECT_GT(of_planes / n, 3.0);
+    EXPECT_LT(of_fields / n, 1.0);
+}
+
 TEST(Splats, coverASphereWithinTheToleranceAndFaceOutwards) {
     const Scene scene = cloudScene(spherePoints(20000), "");
     SplatOptions options;

@@ -23,6 +23,8 @@ std::vector<Surfel> ball(int n) {
         tangents(p, u, v);
         s.along = u * std::cos(a * 3.0f) + v * std::sin(a * 3.0f);
         s.ratio = 0.25f + 0.15f * float(i % 6);
+        s.shading_normal = p;
+        s.bend = Vec3(0.5f, 0.25f, -0.125f);
         s.n_cuts = i % (kMostSurfelCuts + 1);
         for (int c = 0; c < s.n_cuts; ++c)
             s.cuts[size_t(c)] = Vec3(std::cos(a + float(c)), std::sin(a + float(c)), 0.3f);
@@ -168,6 +170,21 @@ TEST(SurfelModel, shapesComeBackWithinTheirSteps) {
                 EXPECT_GT(glm::dot(along, s.along), 0.99f);
             }
             for (int c = 0; c < s.n_cuts; ++c) EXPECT_NEAR(s.cuts[size_t(c)].z, 0.3f, 1e-4f);
+            // At the ends of the half axes, and beyond them.
+            const Vec3 across = glm::cross(s.normal, s.along);
+            const float long_axis = level.spacing * s.radius_share / std::sqrt(s.ratio);
+            for (const float reach : {1.0f, 3.0f}) {
+                const auto at = [&](const Vec3& offset) {
+                    return bentNormal(level, s, kSidePerRadius, offset * (reach * long_axis));
+                };
+                const Vec3 n = s.shading_normal, to = s.along, by = across * s.ratio;
+                const Vec3 far_along = glm::normalize(n + 0.5f * to - 0.125f * across),
+                           far_across =
+                               glm::normalize(n + s.ratio * (0.25f * across - 0.125f * s.along));
+                EXPECT_LT(glm::length(at(to) - far_along), 0.01f);
+                EXPECT_LT(glm::length(at(by) - far_across), 0.01f);
+            }
+            EXPECT_LT(glm::length(bentNormal(level, s, kSidePerRadius, Vec3(0)) - p), 0.04f);
         }
     }
 }
@@ -216,10 +233,16 @@ TEST(SurfelFile, comesBackAsItWas) {
     EXPECT_EQ(surfelFileText(read), text);
     EXPECT_EQ(read.source, "ball.ply");
     EXPECT_EQ(read.levels[1].position, model.levels[1].position);
-    const std::string shaped = surfelFileText(ballModel(SurfelDiscs::kShapes));
-    EXPECT_EQ(surfelFileText(parseSurfelFile(shaped, budget, "ball.stipple")), shaped);
     EXPECT_EQ(text[8], 1);
-    EXPECT_EQ(shaped[8], 3);
+    // Of splats, and of flat ones as older programs wrote them.
+    SurfelModel shaped = ballModel(SurfelDiscs::kShapes);
+    for (const int version : {4, 3}) {
+        const std::string shaped_text = surfelFileText(shaped);
+        EXPECT_EQ(shaped_text[8], version);
+        EXPECT_EQ(surfelFileText(parseSurfelFile(shaped_text, budget, "ball.stipple")),
+                  shaped_text);
+        for (SurfelLevel& level : shaped.levels) level.bends.clear();
+    }
 }
 
 std::string errorOf(const std::string& text) {
