@@ -355,6 +355,7 @@ void checkSurfelFinishes(const std::vector<SurfelFinish>& finishes, const std::s
 
 void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes,
                        const std::string& where) {
+    check(levels.size() <= size_t(kMostSurfelLevels), where, "has more than 64 levels");
     for (const SurfelLevel& level : levels) {
         const size_t n = level.size();
         check(level.normal.size() == n && level.albedo_finish.size() == n &&

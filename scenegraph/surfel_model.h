@@ -16,6 +16,8 @@
 namespace stipple {
 
 inline constexpr int kBlockSurfels = 64;  // most of a block
+// Of a model or a patch. Builders make some 30 at most: each has about half of the last.
+inline constexpr int kMostSurfelLevels = 64;
 // Discs are squares; on a mesh of points whose sides are a spacing, this many spacings close it.
 inline constexpr float kDiscSide = 1.25f;
 // The same for samples of tilted grids (SurfelModel::leaves_no_holes).

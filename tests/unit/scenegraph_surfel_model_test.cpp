@@ -2,6 +2,7 @@
 // Prebuilt models: what is packed comes back, and files that are damaged in any way are refused.
 #include <core/rng.h>
 #include <gtest/gtest.h>
+#include <render/renderer.h>
 #include <scenegraph/disc_planes.h>
 #include <scenegraph/io/surfel_file.h>
 
@@ -222,10 +223,29 @@ TEST(SurfelFile, comesBackAsItWas) {
     EXPECT_EQ(shaped[8], 3);
 }
 
-std::string errorOf(const std::string& text) {
+// Small pictures from near and far.
+void draw(const Scene& scene, ThreadPool& pool) {
+    Renderer renderer(scene, pool);
+    for (const double distance : {1.0, 4.0, 1000.0}) {
+        FrameRequest request;
+        request.camera = lookAt(DVec3(5.0, 0.0, 2.0 + distance), DVec3(5.0, 0.0, 0.0));
+        request.settings.width = request.settings.height = 16;
+        renderer.render(request);
+    }
+}
+
+std::string errorOf(const std::string& text, ThreadPool* pool = nullptr) {
     MemoryBudget budget(0);
     try {
-        parseSurfelFile(text, budget, "m.stipple");
+        SurfelModel model = parseSurfelFile(text, budget, "m.stipple");
+        if (!pool) return "";
+        // What passes can be shown.
+        Scene scene;
+        scene.groups.emplace_back();
+        scene.groups[0].instances.add(addSurfelModel(scene, std::move(model), "m.stipple"),
+                                      Affine());
+        buildScene(scene, *pool);
+        draw(scene, *pool);
     } catch (const Error& error) {
         EXPECT_NE(error.code(), ErrorCode::kInternal);
         return error.what();
@@ -267,19 +287,35 @@ TEST_P(DamagedFile, isRefused) {
         flipped[size_t(rng.uniform(0, double(text.size())))] ^= char(1 << int(rng.uniform(0, 8)));
         EXPECT_NE(errorOf(flipped), "");
     }
-    // Behind a checksum that fits anything may stand: an error or a model, but no crash.
+    // Behind a checksum that fits anything may stand: an error or a model that can be drawn.
+    ThreadPool pool(2);
     for (int i = 0; i < 2000; ++i) {
         std::string forged = text;
         for (int k = 0; k < 3; ++k)
             forged[32 + size_t(rng.uniform(0, double(i % 2 ? 400 : text.size() - 32)))] =
                 char(rng.next());
-        errorOf(withChecksum(forged));
+        errorOf(withChecksum(forged), &pool);
         errorOf(
             withChecksum(forged.substr(0, 32 + size_t(rng.uniform(0, double(text.size() - 32))))));
     }
     std::string newer = text;
     newer[8] = 9;
     EXPECT_NE(errorOf(newer).find("has version 9"), std::string::npos);
+}
+
+// Points know their level as a small number.
+TEST(SurfelFile, withMoreLevelsThanBuildersMakeIsRefused) {
+    SurfelModel model = ballModel(SurfelDiscs::kAlike);
+    model.levels.erase(model.levels.begin());
+    const SurfelLevel level =
+        packSurfels(ball(3), model.finishes, model.levels[0].spacing, SurfelDiscs::kAlike);
+    model.levels.insert(model.levels.end(), kMostSurfelLevels - 1, level);
+    ThreadPool pool(2);
+    EXPECT_EQ(errorOf(surfelFileText(model), &pool), "");
+    for (const size_t more : {size_t(kMostSurfelLevels) + 1, size_t(33000), size_t(65538)}) {
+        model.levels.resize(more, level);
+        EXPECT_EQ(errorOf(surfelFileText(model), &pool), "m.stipple: has more than 64 levels");
+    }
 }
 
 }  // namespace
