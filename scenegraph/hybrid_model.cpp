@@ -61,6 +61,10 @@ void checkHybridModel(const HybridModel& model, const std::string& where) {
     checkLength(mesh.uvs);
     checkLength(mesh.tangents);
     checkLength(mesh.colors);
+    // A material has six textures at most.
+    constexpr size_t kMostLayers = 8;
+    check(mesh.more_uvs.size() <= kMostLayers, where,
+          "has more than 8 further layers of texture coordinates");
     for (const auto& layer : mesh.more_uvs) checkLength(layer);
     check(!model.patches.empty(), where, "has no patches");
     checkMaterials(model, where);
