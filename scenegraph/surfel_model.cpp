@@ -190,7 +190,9 @@ uint64_t interleave(uint32_t x, uint32_t y, uint32_t z) {
 }  // namespace
 
 SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
-                        float spacing, SurfelDiscs discs) {
+                        float spacing, SurfelDiscs discs, std::vector<uint32_t>* place_in_level) {
+    // Positions are then off by a sixty-fourth of a spacing at most.
+    constexpr float kMostExtent = 32.0f;  // spacings
     SurfelLevel level;
     level.spacing = spacing;
     Box3 bounds;
@@ -217,7 +219,11 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
         return a.key != b.key ? a.key < b.key : a.index < b.index;
     });
     std::vector<Surfel> sorted(surfels.size());
-    for (size_t i = 0; i < order.size(); ++i) sorted[i] = surfels[order[i].index];
+    if (place_in_level) place_in_level->resize(surfels.size());
+    for (size_t i = 0; i < order.size(); ++i) {
+        sorted[i] = surfels[order[i].index];
+        if (place_in_level) (*place_in_level)[order[i].index] = uint32_t(i);
+    }
     for (size_t begin = 0; begin < sorted.size();) {
         size_t end = begin;
         SurfelBlock block;
@@ -230,7 +236,12 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
             if ((is_elsewhere && end - begin >= kBlockSurfels / 2) ||
                 (is_other && end - begin >= kBlockSurfels * 3 / 4))
                 break;
-            block.bounds.extend(sorted[end].position);
+            // Nor into a cell that lies far away.
+            Box3 wider = block.bounds;
+            wider.extend(sorted[end].position);
+            const Vec3 size = wider.extent();
+            if (end > begin && std::max({size.x, size.y, size.z}) > kMostExtent * spacing) break;
+            block.bounds = wider;
             is_single_sided =
                 is_single_sided && !finishes[sorted[end].finish].material.double_sided;
         }

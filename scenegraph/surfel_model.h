@@ -144,10 +144,12 @@ struct Surfel {
 // How a level's surfels are kept.
 enum class SurfelDiscs { kAlike, kRadii, kShapes };
 
-// Sorts surfels into blocks of what lies near each other and faces one way, with visibility cones
-// where all finishes of a block are single-sided.
+// Sorts surfels into blocks of what lies near each other, no more than 32 spacings apart, and faces
+// one way, with visibility cones where all finishes of a block are single-sided. place_in_level:
+// for each surfel given, its number in the level; may be null.
 SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
-                        float spacing, SurfelDiscs discs);
+                        float spacing, SurfelDiscs discs,
+                        std::vector<uint32_t>* place_in_level = nullptr);
 Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t index);
 
 // A disc of a shape is as large as that of a square with sides of this many radii.

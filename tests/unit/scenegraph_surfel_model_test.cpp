@@ -66,7 +66,33 @@ TEST(SurfelModel, packedSurfelsComeBackWithinTheirSteps) {
     EXPECT_GT(double(level.size()) / double(level.blocks.size()), 28.0);  // blocks are well filled
 }
 
-// Nothing of a block may be seen from where its cone says so.
+// Few surfels each, so that blocks would go on from one to the next.
+TEST(SurfelModel, whatLiesFarApartKeepsItsPlaces) {
+    for (const SurfelDiscs discs : {SurfelDiscs::kAlike, SurfelDiscs::kShapes}) {
+        std::vector<Surfel> surfels;
+        Rng rng{9};
+        for (int object = 0; object < 40; ++object) {
+            const Vec3 at(float(rng.uniform(-500, 500)), 0.0f, float(rng.uniform(-500, 500)));
+            for (Surfel& s : ball(5)) {
+                s.position = at + s.normal * 0.1f;
+                surfels.push_back(s);
+            }
+        }
+        constexpr float kSpacing = 0.05f;
+        std::vector<uint32_t> place;
+        const SurfelLevel level =
+            packSurfels(surfels, std::vector<SurfelFinish>(2), kSpacing, discs, &place);
+        std::vector<Surfel> kept;
+        for (const SurfelBlock& block : level.blocks) {
+            for (uint32_t i = block.first; i < block.first + block.count; ++i)
+                kept.push_back(unpackSurfel(level, block, i));
+        }
+        ASSERT_EQ(place.size(), surfels.size());
+        for (size_t i = 0; i < surfels.size(); ++i)
+            EXPECT_LT(glm::length(kept[place[i]].position - surfels[i].position), 0.03f * kSpacing);
+    }
+}
+
 // Points a spacing apart on a plane, or on a line in it, with one shading normal that is not its.
 std::vector<float> cosinesToPlane(const Vec3& plane, const Vec3& shading, int columns) {
     Vec3 u, v;
@@ -113,6 +139,7 @@ TEST(SurfelModel, discsLieInTheSurfaceWhateverItsShadingNormal) {
     }
 }
 
+// Nothing of a block may be seen from where its cone says so.
 TEST(SurfelModel, conesHideWhatFacesAway) {
     const SurfelModel model = ballModel(SurfelDiscs::kAlike);
     Rng rng{3};
