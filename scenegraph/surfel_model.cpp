@@ -375,7 +375,7 @@ void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes
               where, "has arrays of different lengths");
         for (const SurfelShape& shape : level.shapes) {
             check(shape.ratio > 0, where, "has a splat that is a line");
-            check(shape.n_cuts <= kMostSurfelCuts &&
+            check(shape.n_cuts <= kMostDiscCuts &&
                       uint64_t(shape.first_cut) + shape.n_cuts <= level.cuts.size(),
                   where, "has a splat whose cuts are not there");
         }

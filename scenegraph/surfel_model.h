@@ -5,6 +5,7 @@
 // 1998, chapters 5 and 6; Pfister, Zwicker, van Baar, Gross. Surfels. 2000.
 #pragma once
 
+#include <core/disc_cuts.h>
 #include <core/material.h>
 #include <core/math.h>
 
@@ -62,8 +63,6 @@ struct SurfelCut {
     int16_t end = 0;
 };
 static_assert(sizeof(SurfelCut) == 4);
-
-inline constexpr int kMostSurfelCuts = 4;
 
 // One density: as structure of arrays, 10 bytes a surfel, 11 with radii of their own, 23 and 4 a
 // cut with shapes.
@@ -132,7 +131,7 @@ struct Surfel {
     Vec3 along = Vec3(1, 0, 0);
     float ratio = 1.0f;
     int n_cuts = 0;
-    std::array<Vec3, kMostSurfelCuts> cuts = {};
+    std::array<Vec3, kMostDiscCuts> cuts = {};
 
     // Half axes of a disc that is as large as a circle of radius 1.
     std::array<Vec3, 2> axes() const {
@@ -158,7 +157,7 @@ inline constexpr float kSidePerRadius = 1.8f;
 // The corners of what is drawn for a surfel's disc, relative to its centre: a square of that side,
 // or, of a shape, a hexagon around its ellipse, without what its cuts take away. Their number;
 // convex, counter-clockwise seen from where the normal points.
-inline constexpr int kMostDiscCorners = 6 + kMostSurfelCuts;
+inline constexpr int kMostDiscCorners = 6 + kMostDiscCuts;
 int discPolygon(const SurfelLevel& level, const Surfel& surfel, float side,
                 std::array<Vec3, kMostDiscCorners>& corners);
 

@@ -24,7 +24,7 @@ std::vector<Surfel> ball(int n) {
         tangents(p, u, v);
         s.along = u * std::cos(a * 3.0f) + v * std::sin(a * 3.0f);
         s.ratio = 0.25f + 0.15f * float(i % 6);
-        s.n_cuts = i % (kMostSurfelCuts + 1);
+        s.n_cuts = i % (kMostDiscCuts + 1);
         for (int c = 0; c < s.n_cuts; ++c)
             s.cuts[size_t(c)] = Vec3(std::cos(a + float(c)), std::sin(a + float(c)), 0.3f);
         surfels.push_back(s);
