@@ -260,6 +260,19 @@ TEST(HybridFile, refusesWhatIsDamaged) {
     EXPECT_NE(errorOf(newer).find("has version 9"), std::string::npos);
 }
 
+TEST(HybridFile, namesHaveNoControlCharacters) {
+    HybridModel model = build(sceneOf(makeRock({})), HybridOptions());
+    model.textures.resize(1);
+    model.textures[0].levels.push_back({1, 1, std::vector<uint8_t>(4)});
+    model.source = model.materials[0].name = model.textures[0].name = "a\x1b[2J\n";
+    MemoryBudget budget(0);
+    const HybridModel read = parseHybridFile(hybridFileText(model), budget, "rock.stipple");
+    for (const std::string& name : {read.source, read.materials[0].name, read.textures[0].name}) {
+        EXPECT_EQ(name[0], 'a');
+        for (const char c : name) EXPECT_GE(c, ' ');
+    }
+}
+
 // Each patch is a mesh with its own copies of vertices and finishes.
 TEST(HybridFile, memoryIsReservedForWhatPatchesBecome) {
     HybridModel model = build(sceneOf(torus(300)), HybridOptions());

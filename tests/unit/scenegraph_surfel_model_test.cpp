@@ -330,6 +330,19 @@ TEST_P(DamagedFile, isRefused) {
     EXPECT_NE(errorOf(newer).find("has version 9"), std::string::npos);
 }
 
+// They reach messages and the terminal.
+TEST(SurfelFile, namesHaveNoControlCharacters) {
+    SurfelModel model = ballModel(SurfelDiscs::kAlike);
+    model.source = "ball\x1b[31m\n.ply";
+    model.finishes[0].material.name = "red\a\r";
+    MemoryBudget budget(0);
+    const SurfelModel read = parseSurfelFile(surfelFileText(model), budget, "ball.stipple");
+    for (const std::string& name : {read.source, read.finishes[0].material.name}) {
+        EXPECT_FALSE(name.empty());
+        for (const char c : name) EXPECT_GE(c, ' ');
+    }
+}
+
 // Points know their level as a small number.
 TEST(SurfelFile, withMoreLevelsThanBuildersMakeIsRefused) {
     SurfelModel model = ballModel(SurfelDiscs::kAlike);
