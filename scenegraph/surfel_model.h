@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prebuilt models: surfels in blocks, at several densities, with what must be known of a block to
-// leave it out. Made by sampling/point_blocks.h and sampling/splats.h, read and written by
+// leave it out. Made by sampling/point_blocks.h and io/splats.h, read and written by
 // io/surfel_file.h, drawn by sampling/surfel_points.h. Based on: Grossman. Point Sample Rendering.
 // 1998, chapters 5 and 6; Pfister, Zwicker, van Baar, Gross. Surfels. 2000.
 #pragma once

@@ -116,7 +116,10 @@ std::string hybridFileText(const HybridModel& model) {
 
 HybridModel parseHybridFile(const std::string& text, MemoryBudget& budget,
                             const std::string& where) {
-    const ModelBody body = modelBody(text, where);
+    return parseHybridBody(modelBody(text, where), budget, where);
+}
+
+HybridModel parseHybridBody(const ModelBody& body, MemoryBudget& budget, const std::string& where) {
     if (body.version != kHybridVersion)
         throw Error(ErrorCode::kParse, where, "holds no hybrid model");
     HybridModel model;

@@ -37,9 +37,9 @@ std::string surfelFileText(const SurfelModel& model) {
     return modelFileText(with_shapes ? kShapeVersion : kSurfelVersion, writer.text);
 }
 
-SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
-                            const std::string& where) {
-    const ModelBody body = modelBody(text, where);
+namespace {
+
+SurfelModel parseSurfelBody(const ModelBody& body, MemoryBudget& budget, const std::string& where) {
     if (body.version != kSurfelVersion && body.version != kShapeVersion)
         throw Error(ErrorCode::kParse, where, "holds no model of surfels alone");
     SurfelModel model;
@@ -48,6 +48,13 @@ SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
     if (!reader.isAtEnd()) throw Error(ErrorCode::kParse, where, "has bytes behind its end");
     checkSurfelModel(model, where);
     return model;
+}
+
+}  // namespace
+
+SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
+                            const std::string& where) {
+    return parseSurfelBody(modelBody(text, where), budget, where);
 }
 
 Mesh discPolygons(const SurfelModel& model, const SurfelLevel& level, float side) {
@@ -114,9 +121,10 @@ ChildRef addSurfelModel(Scene& scene, SurfelModel model, const std::string& name
 ChildRef loadSurfelModel(const std::filesystem::path& path, const std::string& name, Scene& scene,
                          LoadContext& context) {
     const std::string text = readFile(path, context.budget, name);
-    if (modelBody(text, name).version == kHybridVersion)
-        return addHybridModel(scene, parseHybridFile(text, context.budget, name), name);
-    return addSurfelModel(scene, parseSurfelFile(text, context.budget, name), name);
+    const ModelBody body = modelBody(text, name);
+    if (body.version == kHybridVersion)
+        return addHybridModel(scene, parseHybridBody(body, context.budget, name), name);
+    return addSurfelModel(scene, parseSurfelBody(body, context.budget, name), name);
 }
 
 }  // namespace stipple

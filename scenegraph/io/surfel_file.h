@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Model files (*.stipple): versioned, with a checksum; docs/formats.md has the layout.
+// Model files (*.stipple): versioned, with a checksum; docs/models.md has the layout.
 #pragma once
 
 #include <scenegraph/io/load_context.h>
