@@ -128,6 +128,7 @@ Mesh surfelsOf(std::vector<SurfelLevel> levels, const std::vector<SurfelFinish>&
     surfels->area = double(levels[0].size()) * double(levels[0].spacing * levels[0].spacing);
     surfels->levels = std::move(levels);
     surfels->leaves_no_holes = false;
+    measureDiscs(*surfels);
     Mesh mesh;
     mesh.is_patch = true;
     mesh.surfels = std::move(surfels);
@@ -175,8 +176,8 @@ ChildRef addHybridModel(Scene& scene, HybridModel model, const std::string& name
         }
         if (!from.surfels.empty()) {
             Mesh surfels = surfelsOf(std::move(from.surfels), model.finishes);
-            patch.bounds.extend(surfels.surfels->bounds.min);
-            patch.bounds.extend(surfels.surfels->bounds.max);
+            patch.bounds.extend(surfels.surfels->drawn_bounds.min);
+            patch.bounds.extend(surfels.surfels->drawn_bounds.max);
             patch.surfels = add(std::move(surfels));
         }
         patches.push_back(std::move(patch));

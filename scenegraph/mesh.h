@@ -90,7 +90,9 @@ struct Mesh {
     std::vector<double> cumulative_area;    // triangles.size() + 1 entries: the distribution list
     std::vector<uint8_t> triangle_stratum;  // index into strata, one a triangle
     std::vector<Stratum> strata;
-    Box3 bounds;
+    Box3 bounds;  // of all that is drawn
+    // Without the discs of surfels, which reach beyond what their model was made from.
+    Box3 source_bounds;
     double area = 0.0;
 
     size_t bytes() const;

@@ -336,6 +336,59 @@ int discPolygon(const SurfelLevel& level, const Surfel& s, float side,
 
 namespace {
 
+void measureBlock(const SurfelLevel& level, SurfelBlock& block) {
+    DiscSides& sides = block.sides;
+    sides.smallest = sides.largest = sides.longest = level.spacing;
+    if (level.radius.empty()) return;
+    uint8_t least = 255, most = 0;
+    float longest = 0.0f;
+    for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+        const uint8_t code = level.radius[i];
+        least = std::min(least, code), most = std::max(most, code);
+        if (level.shapes.empty()) continue;
+        const float ratio = float(level.shapes[i].ratio) / 255.0f;
+        longest = std::max(longest, surfelRadius(code) / std::sqrt(ratio));
+    }
+    sides.smallest = level.spacing * surfelRadius(least);
+    sides.largest = level.spacing * surfelRadius(most);
+    sides.longest = std::max(level.spacing * longest, sides.largest);
+}
+
+// Of its discs as polygons.
+Box3 drawnBounds(const SurfelModel& model, const SurfelLevel& level, const SurfelBlock& block) {
+    Box3 bounds = block.bounds;
+    if (level.shapes.empty()) {  // squares that are turned any way
+        const Vec3 reach(0.5f * std::sqrt(2.0f) * model.discSide() * block.sides.longest);
+        return {bounds.min - reach, bounds.max + reach};
+    }
+    std::array<Vec3, kMostDiscCorners> corners;
+    for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+        const Surfel s = unpackSurfel(level, block, i);
+        const int n =
+            discPolygon(level, s, model.discSide() * level.spacing * s.radius_share, corners);
+        for (int c = 0; c < n; ++c) bounds.extend(s.position + corners[size_t(c)]);
+    }
+    return bounds;
+}
+
+}  // namespace
+
+void measureDiscs(SurfelModel& model) {
+    model.drawn_bounds = model.bounds;
+    for (SurfelLevel& level : model.levels) {
+        for (SurfelBlock& block : level.blocks) measureBlock(level, block);
+    }
+    // Coarser levels are drawn where their discs would be no larger than a subpixel.
+    const SurfelLevel& finest = model.levels[0];
+    for (const SurfelBlock& block : finest.blocks) {
+        const Box3 drawn = drawnBounds(model, finest, block);
+        model.drawn_bounds.extend(drawn.min);
+        model.drawn_bounds.extend(drawn.max);
+    }
+}
+
+namespace {
+
 bool isSane(const Vec3& v) {
     constexpr float kMost = 1e15f;
     return std::abs(v.x) < kMost && std::abs(v.y) < kMost && std::abs(v.z) < kMost;
@@ -382,6 +435,11 @@ void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes
         check(n > 0, where, "has a level without surfels");
         check(level.spacing > 0.0f && level.spacing < 1e15f, where,
               "has a spacing that is no length");
+        for (uint32_t i = 0; i < uint32_t(level.radius.size()); ++i) {
+            const float ratio = level.shapes.empty() ? 1.0f : float(level.shapes[i].ratio) / 255.0f;
+            check(level.spacing * surfelRadius(level.radius[i]) < 1e15f * std::sqrt(ratio), where,
+                  "has a splat whose size is no length");
+        }
         uint64_t next = 0;
         for (const SurfelBlock& block : level.blocks) {
             check(block.first == next && block.count >= 1 && block.count <= uint32_t(kBlockSurfels),

@@ -24,6 +24,12 @@ inline constexpr float kDiscSide = 1.25f;
 // The same for samples of tilted grids (SurfelModel::leaves_no_holes).
 inline constexpr float kGridDiscSide = 1.65f;
 
+// Of a block's discs, object space, m: sides of squares as large, and the longest extent; of discs
+// that are drawn SurfelModel::discSide() times that.
+struct DiscSides {
+    float smallest = 0.0f, largest = 0.0f, longest = 0.0f;
+};
+
 // Up to 64 surfels that lie near each other and face about the same way.
 struct SurfelBlock {
     Box3 bounds;         // object space; positions are quantized to it
@@ -35,6 +41,7 @@ struct SurfelBlock {
     // -sine * |x - apex|. sine above 1: no such place.
     Vec3 cone_apex = Vec3(0), cone_axis = Vec3(0, 0, 1);
     float cone_sine = 2.0f;
+    DiscSides sides;  // not in files: measureDiscs()
 };
 
 // Positions within a block: 11, 11 and 10 bits.
@@ -107,6 +114,9 @@ struct SurfelModel {
     // and discs are larger.
     bool leaves_no_holes = true;
 
+    // Of all that is drawn: discs reach beyond `bounds`. Not in files: measureDiscs().
+    Box3 drawn_bounds;
+
     float discSide() const { return leaves_no_holes ? kDiscSide : kGridDiscSide; }
 
     size_t bytes() const;
@@ -160,6 +170,9 @@ inline constexpr float kSidePerRadius = 1.8f;
 inline constexpr int kMostDiscCorners = 6 + kMostDiscCuts;
 int discPolygon(const SurfelLevel& level, const Surfel& surfel, float side,
                 std::array<Vec3, kMostDiscCorners>& corners);
+
+// Finds what is kept of the discs and is not in files. O(surfels).
+void measureDiscs(SurfelModel& model);
 
 // Throw kParse (where: names the file) unless blocks, counts, numbers and finishes make sense.
 void checkSurfelModel(const SurfelModel& model, const std::string& where);

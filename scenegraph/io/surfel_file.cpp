@@ -128,3 +128,4 @@ ChildRef loadSurfelModel(const std::filesystem::path& path, const std::string& n
 }
 
 }  // namespace stipple
+    measureDiscs(model);

@@ -92,6 +92,47 @@ TEST(Splats, ellipsesAreFewerThanCirclesAndAsClosed) {
     }
 }
 
+// Splats reach beyond the points that they were made from; tiles that only such a rim lies in show
+// it. Default cameras look at the points.
+TEST(Splats, rimsAreDrawnWhereNothingElseIs) {
+    ThreadPool pool(2);
+    const Scene source = sourceOf(makePrimitive("plane", 2, Vec3(0.8f, 0.5f, 0.3f)));
+    SplatReport report;
+    SplatOptions options = optionsOf(0.5, false, 500);
+    options.has_cuts = false;
+    const Scene model = modelOf(source, options, pool, report);
+    const Mesh& mesh = model.meshes[0];
+    const float border = mesh.source_bounds.max.x, rim = mesh.bounds.max.x - border;
+    ASSERT_GT(rim, 0.01f);
+    EXPECT_NEAR(border, 0.5f, 0.02f);
+    const DBox3 looked_at = sourceBounds(model);
+    EXPECT_EQ(Vec3(looked_at.max), mesh.source_bounds.max);
+    EXPECT_EQ(Vec3(sceneBounds(model).max), mesh.bounds.max);
+    FrameRequest r;
+    r.aovs = {"coverage"};
+    const DVec3 at(double(border + 0.25f * rim), 0.0, 0.0);
+    r.camera = lookAt(at + DVec3(0.0, 4.0, 0.01), at);
+    r.camera.fov_y = 2.0 * std::atan(0.5 / 4.0);
+    r.settings.width = r.settings.height = 384;
+    for (const Method method : {Method::kPoints, Method::kRaycast, Method::kZBuffer}) {
+        r.settings.method = method;
+        r.settings.tile_size = 384;
+        const Image whole = Renderer(model, pool).render(r).image;
+        r.settings.tile_size = 16;
+        const Image tiles = Renderer(model, pool).render(r).image;
+        int shown = 0;
+        for (int y = 0; y < 384; ++y) {
+            for (int x = 0; x < 384; ++x) {
+                const int c = whole.channelIndex("coverage");
+                ASSERT_EQ(whole.pixel(x, y)[c], tiles.pixel(x, y)[c]) << x << " " << y;
+                // The border lies a quarter of the rim left of the middle.
+                shown += x > 193 && whole.pixel(x, y)[c] > 0.0f;
+            }
+        }
+        EXPECT_GT(shown, 0) << int(method);
+    }
+}
+
 TEST(Splats, edgesOfABoxStaySharp) {
     ThreadPool pool(2);
     const Scene source = sourceOf(box());
