@@ -92,6 +92,30 @@ TEST(Splats, ellipsesAreFewerThanCirclesAndAsClosed) {
     }
 }
 
+// What rays and the z-buffer meet, and what is drawn far away.
+TEST(Splats, theMeshThatStandsForThemIsClosed) {
+    ThreadPool pool(2);
+    const Scene source = sourceOf(ring());
+    SplatReport report;
+    const Scene model = modelOf(source, optionsOf(0.1, false), pool, report);
+    SplatOptions all = optionsOf(0.1, false, 100000);  // thinned to 40 000
+    all.naive = true;
+    const Scene naive = modelOf(source, all, pool, report);
+    EXPECT_EQ(report.splats, 100000u);
+    EXPECT_LE(naive.meshes[0].positions.size(), 40000u * 6);
+    for (const Scene* shown : {&model, &naive}) {
+        for (int i = 0; i < 10; ++i) {
+            const Camera camera =
+                cameraTo(source, maskDirectionOf(i * 37 % kMaskDirections), 80.0 + 20.0 * i, 128);
+            const auto result =
+                compareImages(draw(*shown, camera, 128, Method::kRaycast, 16, pool),
+                              draw(source, camera, 128, Method::kRaycast, 16, pool), pool);
+            EXPECT_EQ(result.holes->count, 0u) << i;
+            EXPECT_GE(result.psnr, 26.0) << i;
+        }
+    }
+}
+
 // Splats reach beyond the points that they were made from; tiles that only such a rim lies in show
 // it. Default cameras look at the points.
 TEST(Splats, rimsAreDrawnWhereNothingElseIs) {

@@ -4,9 +4,14 @@
 #include <gtest/gtest.h>
 #include <render/renderer.h>
 #include <scenegraph/disc_planes.h>
+#include <scenegraph/io/load.h>
 #include <scenegraph/io/surfel_file.h>
 
+#include <unistd.h>
+
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 
 namespace stipple {
 namespace {
@@ -328,6 +333,31 @@ TEST_P(DamagedFile, isRefused) {
     std::string newer = text;
     newer[8] = 9;
     EXPECT_NE(errorOf(newer).find("has version 9"), std::string::npos);
+}
+
+// What stands for splats are polygons as large as they; memory is reserved for them, and there are
+// no more than 40 000.
+TEST(SurfelFile, meshThatStandsForSplatsIsWithinTheMemoryLimit) {
+    SurfelModel model = ballModel(SurfelDiscs::kShapes);
+    model.levels = {packSurfels(ball(60000), model.finishes, 0.05f, SurfelDiscs::kShapes)};
+    const std::filesystem::path path =
+        std::filesystem::temp_directory_path() /
+        ("stipple-stand-in-" + std::to_string(getpid()) + ".stipple");
+    std::ofstream(path, std::ios::binary) << surfelFileText(model);
+    ThreadPool pool(2);
+    Diagnostics diagnostics;
+    try {
+        loadScene(path.string(), {true, 10, nullptr}, pool, diagnostics);
+        ADD_FAILURE() << "it was loaded";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory);
+        EXPECT_NE(std::string(error.what()).find("the mesh that stands for 60000"),
+                  std::string::npos);
+    }
+    const Scene scene = loadScene(path.string(), {true, 60, nullptr}, pool, diagnostics);
+    std::filesystem::remove(path);
+    EXPECT_LE(scene.meshes[0].triangles.size(), 40000u * 8);
+    EXPECT_GE(scene.meshes[0].triangles.size(), 40000u * 2);
 }
 
 // They reach messages and the terminal.
