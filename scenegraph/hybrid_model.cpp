@@ -186,6 +186,7 @@ ChildRef addHybridModel(Scene& scene, HybridModel model, const std::string& name
     whole.triangles = std::move(model.triangles);
     whole.triangle_material = std::move(model.triangle_material);
     whole.patches = std::move(patches);
+    whole.patches_source = std::move(model.source);
     return ChildRef::mesh(add(std::move(whole)));
 }
 

@@ -83,7 +83,8 @@ struct Mesh {
 
     // A hybrid model's patches, which are drawn in place of the triangles where these are near.
     std::vector<MeshPatch> patches;
-    bool is_patch = false;  // drawn as such alone: no group instances it
+    std::string patches_source;  // name of the file it was made from
+    bool is_patch = false;       // drawn as such alone: no group instances it
 
     // What buildMesh() adds; it also sorts the triangles (strata, then Morton order).
     std::vector<MeshNode> nodes;
