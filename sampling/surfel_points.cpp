@@ -23,28 +23,6 @@ constexpr float kNearShare = 0.25f;
 // A model whose coarsest level is finer than this share of what is wanted is far.
 constexpr float kFarShare = 0.5f;
 
-// Of a block's discs, object space, m: sides of squares as large, and the longest extent.
-struct BlockSides {
-    float smallest = 0.0f, largest = 0.0f, longest = 0.0f;
-};
-
-BlockSides sidesOf(const SurfelLevel& level, const SurfelBlock& block) {
-    if (level.radius.empty()) return {level.spacing, level.spacing, level.spacing};
-    BlockSides sides;
-    uint8_t least = 255, most = 0;
-    for (uint32_t i = block.first; i < block.first + block.count; ++i) {
-        const uint8_t code = level.radius[i];
-        least = std::min(least, code), most = std::max(most, code);
-        if (level.shapes.empty()) continue;
-        const float ratio = float(level.shapes[i].ratio) / 255.0f;
-        sides.longest = std::max(sides.longest, surfelRadius(code) / std::sqrt(ratio));
-    }
-    sides.smallest = level.spacing * surfelRadius(least);
-    sides.largest = level.spacing * surfelRadius(most);
-    sides.longest = std::max(sides.longest * level.spacing, sides.largest);
-    return sides;
-}
-
 // Subpixels that a ball touches, clipped to nothing; all of the region where it reaches the eye.
 SubpixelRect ballRect(const View& view, const Vec3& c, float r, const SubpixelRect& region) {
     const float f = float(view.focal);
@@ -144,7 +122,7 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
     for (const SurfelBlock& block : level.blocks) {
         if (coneHides(placed.eye, block) || maskHides(placed.eye, block)) continue;
         const Vec3 center(frame.camera_from_object.point(DVec3(block.bounds.center())));
-        const BlockSides sides = sidesOf(level, block);
+        const DiscSides& sides = block.sides;
         float radius = 0.5f * glm::length(block.bounds.extent()) * reach;
         // Each block by its own depth: only what is too near needs discs.
         const float z = std::max(center.z - radius, view.near_z);

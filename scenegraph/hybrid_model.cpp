@@ -61,6 +61,10 @@ void checkHybridModel(const HybridModel& model, const std::string& where) {
     checkLength(mesh.uvs);
     checkLength(mesh.tangents);
     checkLength(mesh.colors);
+    // A material has six textures at most.
+    constexpr size_t kMostLayers = 8;
+    check(mesh.more_uvs.size() <= kMostLayers, where,
+          "has more than 8 further layers of texture coordinates");
     for (const auto& layer : mesh.more_uvs) checkLength(layer);
     check(!model.patches.empty(), where, "has no patches");
     checkMaterials(model, where);
@@ -124,6 +128,7 @@ Mesh surfelsOf(std::vector<SurfelLevel> levels, const std::vector<SurfelFinish>&
     surfels->area = double(levels[0].size()) * double(levels[0].spacing * levels[0].spacing);
     surfels->levels = std::move(levels);
     surfels->leaves_no_holes = false;
+    measureDiscs(*surfels);
     Mesh mesh;
     mesh.is_patch = true;
     mesh.surfels = std::move(surfels);
@@ -171,8 +176,8 @@ ChildRef addHybridModel(Scene& scene, HybridModel model, const std::string& name
         }
         if (!from.surfels.empty()) {
             Mesh surfels = surfelsOf(std::move(from.surfels), model.finishes);
-            patch.bounds.extend(surfels.surfels->bounds.min);
-            patch.bounds.extend(surfels.surfels->bounds.max);
+            patch.bounds.extend(surfels.surfels->drawn_bounds.min);
+            patch.bounds.extend(surfels.surfels->drawn_bounds.max);
             patch.surfels = add(std::move(surfels));
         }
         patches.push_back(std::move(patch));
@@ -181,6 +186,7 @@ ChildRef addHybridModel(Scene& scene, HybridModel model, const std::string& name
     whole.triangles = std::move(model.triangles);
     whole.triangle_material = std::move(model.triangle_material);
     whole.patches = std::move(patches);
+    whole.patches_source = std::move(model.source);
     return ChildRef::mesh(add(std::move(whole)));
 }
 

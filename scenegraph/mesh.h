@@ -83,14 +83,17 @@ struct Mesh {
 
     // A hybrid model's patches, which are drawn in place of the triangles where these are near.
     std::vector<MeshPatch> patches;
-    bool is_patch = false;  // drawn as such alone: no group instances it
+    std::string patches_source;  // name of the file it was made from
+    bool is_patch = false;       // drawn as such alone: no group instances it
 
     // What buildMesh() adds; it also sorts the triangles (strata, then Morton order).
     std::vector<MeshNode> nodes;
     std::vector<double> cumulative_area;    // triangles.size() + 1 entries: the distribution list
     std::vector<uint8_t> triangle_stratum;  // index into strata, one a triangle
     std::vector<Stratum> strata;
-    Box3 bounds;
+    Box3 bounds;  // of all that is drawn
+    // Without the discs of surfels, which reach beyond what their model was made from.
+    Box3 source_bounds;
     double area = 0.0;
 
     size_t bytes() const;

@@ -377,11 +377,13 @@ void buildMesh(Mesh& mesh, const std::vector<Material>& materials, const std::st
     }
     mesh.area = mesh.cumulative_area.back();
     OctreeBuilder(mesh, codes).build();
-    if (mesh.surfels) {
-        // What stands for the model lies within.
-        mesh.bounds = mesh.surfels->bounds;
-        mesh.nodes[0].bounds = mesh.bounds;
-    }
+    mesh.source_bounds = mesh.surfels ? mesh.surfels->bounds : mesh.bounds;
+    const auto extendBy = [&](const Box3& box) {
+        if (!box.isEmpty()) mesh.bounds.extend(box.min), mesh.bounds.extend(box.max);
+    };
+    if (mesh.surfels) extendBy(mesh.surfels->drawn_bounds);
+    for (const MeshPatch& patch : mesh.patches) extendBy(patch.bounds);
+    mesh.nodes[0].bounds = mesh.bounds;
 }
 
 size_t Mesh::bytes() const {

@@ -2,6 +2,9 @@
 #include <scenegraph/scene.h>
 
 #include <scenegraph/group_build.h>
+#include <scenegraph/group_sums.h>
+
+#include <algorithm>
 
 namespace stipple {
 
@@ -128,6 +131,31 @@ std::vector<double> meshInstances(const Scene& scene) {
 
 DBox3 sceneBounds(const Scene& scene) {
     return scene.root < scene.groups.size() ? scene.groups[scene.root].bounds : DBox3();
+}
+
+DBox3 sourceBounds(const Scene& scene) {
+    const auto has_discs = [](const Mesh& m) { return m.surfels != nullptr; };
+    if (scene.root >= scene.groups.size() ||
+        std::none_of(scene.meshes.begin(), scene.meshes.end(), has_discs))
+        return sceneBounds(scene);
+    std::vector<DBox3> bounds(scene.groups.size());
+    for (const uint32_t g : childrenFirst(scene)) {
+        const InstanceStore& instances = scene.groups[g].instances;
+        for (size_t i = 0; i < instances.size(); ++i) {
+            const ChildRef child = instances.child(i);
+            if (child.isNone()) continue;
+            ChildSums sums;
+            if (child.isGroup()) {
+                sums.bounds = bounds[child.index()];
+            } else if (const Box3& b = scene.meshes[child.index()].source_bounds; !b.isEmpty()) {
+                sums.bounds = {DVec3(b.min), DVec3(b.max)};
+            }
+            DVec3 center, half;
+            if (instanceBox(sums, instances.groupFromChild(i), center, half))
+                bounds[g].extend(DBox3{center - half, center + half});
+        }
+    }
+    return bounds[scene.root];
 }
 
 Camera cameraForBounds(const DBox3& bounds) {

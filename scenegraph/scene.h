@@ -66,6 +66,10 @@ std::vector<double> meshInstances(const Scene& scene);
 // World-space bounds of everything.
 DBox3 sceneBounds(const Scene& scene);
 
+// The same without the discs of models of points, which reach beyond what these were made from:
+// what default cameras look at. O(stored instances) if there are such models.
+DBox3 sourceBounds(const Scene& scene);
+
 // A camera that sees the whole box from the front, above right.
 Camera cameraForBounds(const DBox3& bounds);
 

@@ -201,7 +201,9 @@ uint64_t interleave(uint32_t x, uint32_t y, uint32_t z) {
 }  // namespace
 
 SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
-                        float spacing, SurfelDiscs discs) {
+                        float spacing, SurfelDiscs discs, std::vector<uint32_t>* place_in_level) {
+    // Positions are then off by a sixty-fourth of a spacing at most.
+    constexpr float kMostExtent = 32.0f;  // spacings
     SurfelLevel level;
     level.spacing = spacing;
     Box3 bounds;
@@ -228,7 +230,11 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
         return a.key != b.key ? a.key < b.key : a.index < b.index;
     });
     std::vector<Surfel> sorted(surfels.size());
-    for (size_t i = 0; i < order.size(); ++i) sorted[i] = surfels[order[i].index];
+    if (place_in_level) place_in_level->resize(surfels.size());
+    for (size_t i = 0; i < order.size(); ++i) {
+        sorted[i] = surfels[order[i].index];
+        if (place_in_level) (*place_in_level)[order[i].index] = uint32_t(i);
+    }
     for (size_t begin = 0; begin < sorted.size();) {
         size_t end = begin;
         SurfelBlock block;
@@ -241,7 +247,12 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
             if ((is_elsewhere && end - begin >= kBlockSurfels / 2) ||
                 (is_other && end - begin >= kBlockSurfels * 3 / 4))
                 break;
-            block.bounds.extend(sorted[end].position);
+            // Nor into a cell that lies far away.
+            Box3 wider = block.bounds;
+            wider.extend(sorted[end].position);
+            const Vec3 size = wider.extent();
+            if (end > begin && std::max({size.x, size.y, size.z}) > kMostExtent * spacing) break;
+            block.bounds = wider;
             is_single_sided =
                 is_single_sided && !finishes[sorted[end].finish].material.double_sided;
         }
@@ -356,6 +367,59 @@ int discPolygon(const SurfelLevel& level, const Surfel& s, float side,
 
 namespace {
 
+void measureBlock(const SurfelLevel& level, SurfelBlock& block) {
+    DiscSides& sides = block.sides;
+    sides.smallest = sides.largest = sides.longest = level.spacing;
+    if (level.radius.empty()) return;
+    uint8_t least = 255, most = 0;
+    float longest = 0.0f;
+    for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+        const uint8_t code = level.radius[i];
+        least = std::min(least, code), most = std::max(most, code);
+        if (level.shapes.empty()) continue;
+        const float ratio = float(level.shapes[i].ratio) / 255.0f;
+        longest = std::max(longest, surfelRadius(code) / std::sqrt(ratio));
+    }
+    sides.smallest = level.spacing * surfelRadius(least);
+    sides.largest = level.spacing * surfelRadius(most);
+    sides.longest = std::max(level.spacing * longest, sides.largest);
+}
+
+// Of its discs as polygons.
+Box3 drawnBounds(const SurfelModel& model, const SurfelLevel& level, const SurfelBlock& block) {
+    Box3 bounds = block.bounds;
+    if (level.shapes.empty()) {  // squares that are turned any way
+        const Vec3 reach(0.5f * std::sqrt(2.0f) * model.discSide() * block.sides.longest);
+        return {bounds.min - reach, bounds.max + reach};
+    }
+    std::array<Vec3, kMostDiscCorners> corners;
+    for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+        const Surfel s = unpackSurfel(level, block, i);
+        const int n =
+            discPolygon(level, s, model.discSide() * level.spacing * s.radius_share, corners);
+        for (int c = 0; c < n; ++c) bounds.extend(s.position + corners[size_t(c)]);
+    }
+    return bounds;
+}
+
+}  // namespace
+
+void measureDiscs(SurfelModel& model) {
+    model.drawn_bounds = model.bounds;
+    for (SurfelLevel& level : model.levels) {
+        for (SurfelBlock& block : level.blocks) measureBlock(level, block);
+    }
+    // Coarser levels are drawn where their discs would be no larger than a subpixel.
+    const SurfelLevel& finest = model.levels[0];
+    for (const SurfelBlock& block : finest.blocks) {
+        const Box3 drawn = drawnBounds(model, finest, block);
+        model.drawn_bounds.extend(drawn.min);
+        model.drawn_bounds.extend(drawn.max);
+    }
+}
+
+namespace {
+
 bool isSane(const Vec3& v) {
     constexpr float kMost = 1e15f;
     return std::abs(v.x) < kMost && std::abs(v.y) < kMost && std::abs(v.z) < kMost;
@@ -386,6 +450,7 @@ void checkSurfelFinishes(const std::vector<SurfelFinish>& finishes, const std::s
 
 void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes,
                        const std::string& where) {
+    check(levels.size() <= size_t(kMostSurfelLevels), where, "has more than 64 levels");
     for (const SurfelLevel& level : levels) {
         const size_t n = level.size();
         check(level.normal.size() == n && level.albedo_finish.size() == n &&
@@ -395,13 +460,18 @@ void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes
               where, "has arrays of different lengths");
         for (const SurfelShape& shape : level.shapes) {
             check(shape.ratio > 0, where, "has a splat that is a line");
-            check(shape.n_cuts <= kMostSurfelCuts &&
+            check(shape.n_cuts <= kMostDiscCuts &&
                       uint64_t(shape.first_cut) + shape.n_cuts <= level.cuts.size(),
                   where, "has a splat whose cuts are not there");
         }
         check(n > 0, where, "has a level without surfels");
         check(level.spacing > 0.0f && level.spacing < 1e15f, where,
               "has a spacing that is no length");
+        for (uint32_t i = 0; i < uint32_t(level.radius.size()); ++i) {
+            const float ratio = level.shapes.empty() ? 1.0f : float(level.shapes[i].ratio) / 255.0f;
+            check(level.spacing * surfelRadius(level.radius[i]) < 1e15f * std::sqrt(ratio), where,
+                  "has a splat whose size is no length");
+        }
         uint64_t next = 0;
         for (const SurfelBlock& block : level.blocks) {
             check(block.first == next && block.count >= 1 && block.count <= uint32_t(kBlockSurfels),

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prebuilt models: surfels in blocks, at several densities, with what must be known of a block to
-// leave it out. Made by sampling/point_blocks.h and sampling/splats.h, read and written by
+// leave it out. Made by sampling/point_blocks.h and io/splats.h, read and written by
 // io/surfel_file.h, drawn by sampling/surfel_points.h. Based on: Grossman. Point Sample Rendering.
 // 1998, chapters 5 and 6; Pfister, Zwicker, van Baar, Gross. Surfels. 2000.
 #pragma once
 
+#include <core/disc_cuts.h>
 #include <core/material.h>
 #include <core/math.h>
 
@@ -16,10 +17,18 @@
 namespace stipple {
 
 inline constexpr int kBlockSurfels = 64;  // most of a block
+// Of a model or a patch. Builders make some 30 at most: each has about half of the last.
+inline constexpr int kMostSurfelLevels = 64;
 // Discs are squares; on a mesh of points whose sides are a spacing, this many spacings close it.
 inline constexpr float kDiscSide = 1.25f;
 // The same for samples of tilted grids (SurfelModel::leaves_no_holes).
 inline constexpr float kGridDiscSide = 1.65f;
+
+// Of a block's discs, object space, m: sides of squares as large, and the longest extent; of discs
+// that are drawn SurfelModel::discSide() times that.
+struct DiscSides {
+    float smallest = 0.0f, largest = 0.0f, longest = 0.0f;
+};
 
 // Up to 64 surfels that lie near each other and face about the same way.
 struct SurfelBlock {
@@ -32,6 +41,7 @@ struct SurfelBlock {
     // -sine * |x - apex|. sine above 1: no such place.
     Vec3 cone_apex = Vec3(0), cone_axis = Vec3(0, 0, 1);
     float cone_sine = 2.0f;
+    DiscSides sides;  // not in files: measureDiscs()
 };
 
 // Positions within a block: 11, 11 and 10 bits.
@@ -60,8 +70,6 @@ struct SurfelCut {
     int16_t end = 0;
 };
 static_assert(sizeof(SurfelCut) == 4);
-
-inline constexpr int kMostSurfelCuts = 4;
 
 // How the shading normal turns over a splat: by so many 64ths of a radian a long half axis, about.
 // (xx, yy, xy): its part along the long half axis changes by xx along it and xy across, its part
@@ -116,6 +124,9 @@ struct SurfelModel {
     // and discs are larger.
     bool leaves_no_holes = true;
 
+    // Of all that is drawn: discs reach beyond `bounds`. Not in files: measureDiscs().
+    Box3 drawn_bounds;
+
     float discSide() const { return leaves_no_holes ? kDiscSide : kGridDiscSide; }
 
     size_t bytes() const;
@@ -140,7 +151,7 @@ struct Surfel {
     Vec3 along = Vec3(1, 0, 0);
     float ratio = 1.0f;
     int n_cuts = 0;
-    std::array<Vec3, kMostSurfelCuts> cuts = {};
+    std::array<Vec3, kMostDiscCuts> cuts = {};
     // Of shapes: the shading normal at the centre, and SurfelBend's slopes a long half axis.
     Vec3 shading_normal = Vec3(0, 0, 1);
     Vec3 bend = Vec3(0);
@@ -155,10 +166,12 @@ struct Surfel {
 // How a level's surfels are kept.
 enum class SurfelDiscs { kAlike, kRadii, kShapes };
 
-// Sorts surfels into blocks of what lies near each other and faces one way, with visibility cones
-// where all finishes of a block are single-sided.
+// Sorts surfels into blocks of what lies near each other, no more than 32 spacings apart, and faces
+// one way, with visibility cones where all finishes of a block are single-sided. place_in_level:
+// for each surfel given, its number in the level; may be null.
 SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFinish>& finishes,
-                        float spacing, SurfelDiscs discs);
+                        float spacing, SurfelDiscs discs,
+                        std::vector<uint32_t>* place_in_level = nullptr);
 Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t index);
 // The unit shading normal of a surfel of a level with bends at an offset from its centre, object
 // space; beyond its ellipse as at its rim. side: SurfelModel::discSide().
@@ -170,9 +183,12 @@ inline constexpr float kSidePerRadius = 1.8f;
 // The corners of what is drawn for a surfel's disc, relative to its centre: a square of that side,
 // or, of a shape, a hexagon around its ellipse, without what its cuts take away. Their number;
 // convex, counter-clockwise seen from where the normal points.
-inline constexpr int kMostDiscCorners = 6 + kMostSurfelCuts;
+inline constexpr int kMostDiscCorners = 6 + kMostDiscCuts;
 int discPolygon(const SurfelLevel& level, const Surfel& surfel, float side,
                 std::array<Vec3, kMostDiscCorners>& corners);
+
+// Finds what is kept of the discs and is not in files. O(surfels).
+void measureDiscs(SurfelModel& model);
 
 // Throw kParse (where: names the file) unless blocks, counts, numbers and finishes make sense.
 void checkSurfelModel(const SurfelModel& model, const std::string& where);

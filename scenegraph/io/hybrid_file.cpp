@@ -72,6 +72,38 @@ void transferModel(Stream& stream, std::string& kind, HybridModel& model) {
     });
 }
 
+// What building the whole surface takes, and each patch's levels, which are meshes of their own
+// with copies of their vertices.
+double builtBytes(const HybridModel& model) {
+    const Mesh& mesh = model.mesh;
+    const double layer_bytes = double(mesh.more_uvs.size()) * sizeof(Vec2);
+    const double vertex_bytes = kBytesPerVertex + layer_bytes;
+    const double mesh_bytes = sizeof(Mesh) + sizeof(MeshNode) + sizeof(Stratum) +
+                              double(mesh.more_uvs.size()) * sizeof(std::vector<Vec2>);
+    const double finish_bytes = double(model.finishes.size()) * sizeof(SurfelFinish);
+    double bytes = double(model.triangles.size()) * kBytesPerTriangle +
+                   double(mesh.positions.size()) * kBytesPerVertex;
+    std::vector<uint32_t> seen_by(mesh.positions.size(), 0);  // the last level that has the vertex
+    uint32_t n_levels = 0;
+    for (const HybridPatch& patch : model.patches) {
+        bytes += sizeof(MeshPatch) + double(patch.triangles.size()) * sizeof(MeshPatch::Triangles);
+        for (const TriangleLevel& level : patch.triangles) {
+            ++n_levels;
+            size_t vertices = 0;
+            for (const UVec3& t : level.triangles) {
+                for (int k = 0; k < 3; ++k) {
+                    vertices += seen_by[t[k]] != n_levels;
+                    seen_by[t[k]] = n_levels;
+                }
+            }
+            bytes += mesh_bytes + double(level.triangles.size()) * kBytesPerTriangle +
+                     double(vertices) * vertex_bytes;
+        }
+        if (!patch.surfels.empty()) bytes += mesh_bytes + sizeof(SurfelModel) + finish_bytes;
+    }
+    return bytes;
+}
+
 }  // namespace
 
 std::string hybridFileText(const HybridModel& model) {
@@ -84,7 +116,10 @@ std::string hybridFileText(const HybridModel& model) {
 
 HybridModel parseHybridFile(const std::string& text, MemoryBudget& budget,
                             const std::string& where) {
-    const ModelBody body = modelBody(text, where);
+    return parseHybridBody(modelBody(text, where), budget, where);
+}
+
+HybridModel parseHybridBody(const ModelBody& body, MemoryBudget& budget, const std::string& where) {
     if (body.version != kHybridVersion)
         throw Error(ErrorCode::kParse, where, "holds no hybrid model");
     HybridModel model;
@@ -94,10 +129,9 @@ HybridModel parseHybridFile(const std::string& text, MemoryBudget& budget,
     if (kind != kKind) throw Error(ErrorCode::kParse, where, "is a model of an unknown kind");
     if (!reader.isAtEnd()) throw Error(ErrorCode::kParse, where, "has bytes behind its end");
     checkHybridModel(model, where);
-    // Building the whole surface and the patches' copies of it.
-    budget.take(2.5 * (double(model.triangles.size()) * kBytesPerTriangle +
-                       double(model.mesh.positions.size()) * kBytesPerVertex),
-                where, std::to_string(model.triangles.size()) + " triangles");
+    budget.take(builtBytes(model), where,
+                std::to_string(model.triangles.size()) + " triangles and " +
+                    std::to_string(model.patches.size()) + " patches");
     return model;
 }
 

@@ -4,6 +4,7 @@
 
 #include <scenegraph/hybrid_model.h>
 #include <scenegraph/io/load_context.h>
+#include <scenegraph/io/model_stream.h>
 
 namespace stipple {
 
@@ -14,5 +15,7 @@ std::string hybridFileText(const HybridModel& model);
 // version; kOutOfMemory. where: names the file.
 HybridModel parseHybridFile(const std::string& text, MemoryBudget& budget,
                             const std::string& where);
+// The same of a file whose header has been read.
+HybridModel parseHybridBody(const ModelBody& body, MemoryBudget& budget, const std::string& where);
 
 }  // namespace stipple

@@ -51,7 +51,7 @@ Scene loadScene(const std::string& path, const LoadOptions& options, ThreadPool&
         if (bounds.isEmpty()) diagnostics.warn(oneLine(path, 300), "the scene is empty");
         // Single assets always have a camera of that name, before their own.
         if (scene.cameras.empty() || is_asset) {
-            Camera camera = bounds.isEmpty() ? Camera() : cameraForBounds(bounds);
+            Camera camera = bounds.isEmpty() ? Camera() : cameraForBounds(sourceBounds(scene));
             camera.name = "default";
             scene.cameras.insert(scene.cameras.begin(), camera);
         }

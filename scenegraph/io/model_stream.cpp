@@ -2,6 +2,7 @@
 #include <scenegraph/io/model_stream.h>
 
 #include <core/rng.h>
+#include <scenegraph/io/json.h>
 
 namespace stipple {
 
@@ -28,6 +29,12 @@ uint64_t checksum(const char* data, size_t size) {
 }
 
 }  // namespace
+
+void ModelReader::string(std::string& s) {
+    uint32_t n = 0;
+    value(n);
+    s = oneLine({take(n), n});
+}
 
 std::string modelFileText(uint32_t version, const std::string& body) {
     Header header = {{}, version, 0, body.size(), checksum(body.data(), body.size())};

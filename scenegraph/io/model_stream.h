@@ -70,11 +70,8 @@ public:
     void value(T& v) {
         std::memcpy(&v, take(sizeof v), sizeof v);
     }
-    void string(std::string& s) {
-        uint32_t n = 0;
-        value(n);
-        s.assign(take(n), n);
-    }
+    // Names: they reach messages and the terminal, so control characters are left out.
+    void string(std::string& s);
     template <class T>
     void array(std::vector<T>& v) {
         uint64_t n = 0;

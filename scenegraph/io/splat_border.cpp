@@ -128,7 +128,7 @@ void cutAtBorders(const SplatPoints& points, const PointIndex& index, std::vecto
         const float angle = 2.0f * float(kPi) * float(k) / float(kCorners);
         corners.emplace_back(a * std::cos(angle), b * std::sin(angle));
     }
-    for (const Vec3& line : chooseLines(corners, lines, size_t(kMostCuts - splat.n_cuts)))
+    for (const Vec3& line : chooseLines(corners, lines, size_t(kMostDiscCuts - splat.n_cuts)))
         splat.cuts[size_t(splat.n_cuts++)] = line;
 }
 

@@ -85,7 +85,7 @@ bool SplatGrower::cut(Grown& grown, uint32_t point, const Around& p) const {
     constexpr float kLeastSine = 0.3f, kNextTo = 2.0f;  // spacings
     const SplatPoint& other = points_[p.index];
     const Frame& frame = grown.frame;
-    if (!rules_.has_cuts || grown.n_cuts == kMostCuts || !other.is_at_crease) return false;
+    if (!rules_.has_cuts || grown.n_cuts == kMostDiscCuts || !other.is_at_crease) return false;
     const Vec2 g(glm::dot(other.normal, frame.along), glm::dot(other.normal, frame.across));
     const float sine = glm::length(g);
     if (sine < kLeastSine) return false;

@@ -5,6 +5,7 @@
 // Perspective Accurate Splatting. 2004 (clip lines).
 #pragma once
 
+#include <core/disc_cuts.h>
 #include <scenegraph/io/splat_points.h>
 
 #include <array>
@@ -17,8 +18,6 @@ struct SplatRules {
     bool are_circles = false;
     bool has_cuts = true;
 };
-
-inline constexpr int kMostCuts = 4;
 
 // Covers the points within its ellipse and its cuts; drawn, it is `gap` wider.
 struct Splat {
@@ -33,7 +32,7 @@ struct Splat {
     // (xx, yy, xy) as in SurfelBend.
     Vec3 shading_normal = Vec3(0, 0, 1), bend = Vec3(0);
     // Nothing where x a + y b > z, a along, b across; (x, y) unit, z in m, not negative.
-    std::array<Vec3, kMostCuts> cuts = {};
+    std::array<Vec3, kMostDiscCuts> cuts = {};
 
     Vec3 across() const { return glm::cross(normal, along); }
     float reach(float tolerance) const {
@@ -87,7 +86,7 @@ private:
         size_t n_points = 0;
         bool is_ended = false;
         int n_cuts = 0;
-        std::array<Cut, kMostCuts> cuts;
+        std::array<Cut, kMostDiscCuts> cuts;
     };
 
     Frame frameOf(uint32_t point, const Vec3& normal) const;

@@ -39,7 +39,8 @@ Surfel surfelOf(const Splat& splat, float spacing) {
 }  // namespace
 
 SurfelModel packSplats(const std::vector<Splat>& splats, const std::vector<SurfelFinish>& finishes,
-                       const DVec3& middle, const Box3& bounds, double area) {
+                       const DVec3& middle, const Box3& bounds, double area,
+                       std::vector<Surfel>* kept) {
     std::vector<float> sides;
     for (const Splat& s : splats) {
         sides.push_back(std::sqrt((s.long_radius + s.gap) * (s.short_radius + s.gap)) *
@@ -55,11 +56,24 @@ SurfelModel packSplats(const std::vector<Splat>& splats, const std::vector<Surfe
     model.bounds = bounds;
     model.area = area;
     model.finishes = finishes;
-    SurfelLevel level = packSurfels(std::move(surfels), finishes, spacing, SurfelDiscs::kShapes);
+    std::vector<uint32_t> place_in_level;
+    SurfelLevel level =
+        packSurfels(std::move(surfels), finishes, spacing, SurfelDiscs::kShapes, &place_in_level);
     for (SurfelBlock& block : level.blocks) {
         block.bounds.min += Vec3(middle);
         block.bounds.max += Vec3(middle);
         block.cone_apex += Vec3(middle);
+    }
+    if (kept) {
+        std::vector<Surfel> in_level;
+        for (const SurfelBlock& block : level.blocks) {
+            for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+                in_level.push_back(unpackSurfel(level, block, i));
+                in_level.back().position = Vec3(DVec3(in_level.back().position) - middle);
+            }
+        }
+        kept->clear();
+        for (const uint32_t place : place_in_level) kept->push_back(in_level[place]);
     }
     model.levels.push_back(std::move(level));
     return model;

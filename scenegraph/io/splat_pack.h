@@ -9,9 +9,11 @@
 
 namespace stipple {
 
-// splats: relative to `middle`, at least one. bounds, area: of what they stand for. O(n log n).
+// splats: relative to `middle`, at least one. bounds, area: of what they stand for. kept: gets, one
+// a splat, its surfel as the model has it, but relative to `middle`; may be null. O(n log n).
 SurfelModel packSplats(const std::vector<Splat>& splats, const std::vector<SurfelFinish>& finishes,
-                       const DVec3& middle, const Box3& bounds, double area);
+                       const DVec3& middle, const Box3& bounds, double area,
+                       std::vector<Surfel>* kept = nullptr);
 
 // Of the surface that a point stands for, about, m^2; its spacing is known.
 inline double areaOf(const SplatPoint& p) {

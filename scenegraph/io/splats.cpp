@@ -93,11 +93,13 @@ public:
         for (SurfelFinish& finish : finishes_) finish.patch_width = float(diagonal);
         double area = 0.0;
         for (const SplatPoint& p : points_) area += areaOf(p);
-        SurfelModel model = packSplats(splats, finishes_, middle_, enclosingFloatBox(bounds), area);
+        std::vector<Surfel> kept;
+        SurfelModel model =
+            packSplats(splats, finishes_, middle_, enclosingFloatBox(bounds), area, &kept);
         report.points = points_.size();
         report.splats = splats.size();
         report.tolerance = double(rules.tolerance);
-        measure(chosen, report);
+        measure(chosen, kept, report);
         report.seconds = watch.seconds();
         return model;
     }
@@ -194,13 +196,14 @@ private:
         return finish_of_[material] = uint8_t(finishes_.size() - 1);
     }
 
-    // How far points are from the nearest of the splats that cover them.
-    void measure(const std::vector<ChosenSplat>& chosen, SplatReport& report) const {
+    // How far points are from the nearest of the splats that cover them, as the model keeps these.
+    void measure(const std::vector<ChosenSplat>& chosen, const std::vector<Surfel>& kept,
+                 SplatReport& report) const {
         std::vector<float> distance(points_.size(), kInfinity);
-        for (const auto& [splat, covered] : chosen) {
-            for (const uint32_t k : covered) {
+        for (size_t s = 0; s < chosen.size(); ++s) {
+            for (const uint32_t k : chosen[s].covered) {
                 const float d =
-                    std::abs(glm::dot(points_[k].position - splat.center, splat.normal));
+                    std::abs(glm::dot(points_[k].position - kept[s].position, kept[s].normal));
                 distance[k] = std::min(distance[k], d);
             }
         }

@@ -42,9 +42,9 @@ std::string surfelFileText(const SurfelModel& model) {
     return modelFileText(version, writer.text);
 }
 
-SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
-                            const std::string& where) {
-    const ModelBody body = modelBody(text, where);
+namespace {
+
+SurfelModel parseSurfelBody(const ModelBody& body, MemoryBudget& budget, const std::string& where) {
     if (body.version == kHybridVersion)
         throw Error(ErrorCode::kParse, where, "holds no model of surfels alone");
     SurfelModel model;
@@ -55,19 +55,59 @@ SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
     return model;
 }
 
-Mesh discPolygons(const SurfelModel& model, const SurfelLevel& level, float side) {
+}  // namespace
+
+SurfelModel parseSurfelFile(const std::string& text, MemoryBudget& budget,
+                            const std::string& where) {
+    return parseSurfelBody(modelBody(text, where), budget, where);
+}
+
+namespace {
+
+// Which of a level's discs are left out: of those smaller than `whole`, all but n_kept of n_small,
+// evenly; these are the larger for it.
+struct Thinning {
+    int whole = 0;  // as SurfelLevel::radius
+    uint64_t n_small = 0, n_kept = 0;
+
+    bool keeps(uint64_t i) const { return (i + 1) * n_kept / n_small != i * n_kept / n_small; }
+    float enlarged() const { return n_kept > 0 ? std::sqrt(float(n_small) / float(n_kept)) : 1.0f; }
+};
+
+// To `most` discs. Half of these are the largest, which would show, if there are such.
+Thinning thinnedTo(const SurfelLevel& level, size_t most) {
+    Thinning thinning;
+    if (level.size() <= most) return thinning;
+    std::array<size_t, 257> n_from = {};  // discs of that code and larger
+    for (const uint8_t code : level.radius) ++n_from[code];
+    for (int code = 255; code >= 0; --code) n_from[size_t(code)] += n_from[size_t(code) + 1];
+    thinning.whole = 256;
+    while (!level.radius.empty() && n_from[size_t(thinning.whole) - 1] <= most / 2)
+        --thinning.whole;
+    const size_t n_whole = n_from[size_t(thinning.whole)];
+    thinning.n_small = level.size() - n_whole;
+    thinning.n_kept = most - n_whole;
+    return thinning;
+}
+
+// Squares or polygons with sides of that many spacings; materials: finishes.
+Mesh polygonsOf(const SurfelLevel& level, float side, const Thinning& thinning) {
     Mesh mesh;
     std::array<Vec3, kMostDiscCorners> corners;
+    uint64_t n_seen = 0;  // small ones
     for (const SurfelBlock& block : level.blocks) {
         for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const bool is_small = (level.radius.empty() ? 0 : level.radius[i]) < thinning.whole;
+            if (is_small && !thinning.keeps(n_seen++)) continue;
             const Surfel s = unpackSurfel(level, block, i);
-            const int n = discPolygon(level, s, level.spacing * s.radius_share * side, corners);
+            const float scale = side * (is_small ? thinning.enlarged() : 1.0f);
+            const int n = discPolygon(level, s, level.spacing * s.radius_share * scale, corners);
             const uint32_t first = uint32_t(mesh.positions.size());
             for (int k = 0; k < n; ++k) {
-                // Within the source's bounds: both are looked at from the same default camera.
-                mesh.positions.push_back(glm::clamp(s.position + corners[size_t(k)],
-                                                    model.bounds.min, model.bounds.max));
-                mesh.normals.push_back(s.normal);
+                const Vec3& corner = corners[size_t(k)];
+                mesh.positions.push_back(s.position + corner);
+                mesh.normals.push_back(level.bends.empty() ? s.normal
+                                                           : bentNormal(level, s, side, corner));
                 mesh.colors.emplace_back(s.albedo, 1.0f);
             }
             for (int k = 2; k < n; ++k) {
@@ -79,31 +119,52 @@ Mesh discPolygons(const SurfelModel& model, const SurfelLevel& level, float side
     return mesh;
 }
 
+}  // namespace
+
+Mesh discPolygons(const SurfelModel& model, const SurfelLevel& level, float side) {
+    Mesh mesh = polygonsOf(level, side, Thinning());
+    for (Vec3& p : mesh.positions) p = glm::clamp(p, model.bounds.min, model.bounds.max);
+    return mesh;
+}
+
 namespace {
 
-// Squares in place of surfels, of the area that their surface has, from the finest level that is
-// not too large.
+constexpr size_t kMostStandIns = 40000;
+
+// The finest that is not too large, or the coarsest.
+const SurfelLevel& standInLevel(const SurfelModel& model) {
+    for (const SurfelLevel& level : model.levels) {
+        if (level.size() <= kMostStandIns) return level;
+    }
+    return model.levels.back();
+}
+
+// What building the mesh below takes.
+double standInBytes(const SurfelModel& model) {
+    const SurfelLevel& level = standInLevel(model);
+    const double count = double(std::min(level.size(), kMostStandIns));
+    const double corners =
+        level.shapes.empty() ? 4.0 : 6.0 + double(level.cuts.size()) / double(level.size());
+    return count * (corners * kBytesPerVertex + (corners - 2.0) * kBytesPerTriangle);
+}
+
 Mesh standInMesh(const SurfelModel& model) {
-    constexpr size_t kMostSquares = 40000;
-    const SurfelLevel* level = &model.levels.back();
-    for (const SurfelLevel& l : model.levels) {
-        if (l.size() <= kMostSquares) {
-            level = &l;
-            break;
-        }
-    }
-    double area = 0.0;  // of all squares with a side of the spacing
-    for (uint32_t i = 0; i < level->size(); ++i) {
-        const double share = level->radius.empty() ? 1.0 : double(surfelRadius(level->radius[i]));
-        area += share * share * double(level->spacing) * double(level->spacing);
-    }
-    const double shrink = area > 0.0 && model.area > 0.0 ? std::sqrt(model.area / area) : 1.0;
-    return discPolygons(model, *level, float(shrink));
+    const SurfelLevel& level = standInLevel(model);
+    const Thinning thinning = thinnedTo(level, kMostStandIns);
+    // Splats are as large as it takes to close the surface.
+    if (!level.radius.empty()) return polygonsOf(level, model.discSide(), thinning);
+    // Others are alike, and together as large as the surface.
+    const double area = double(level.size()) * double(level.spacing) * double(level.spacing);
+    const double side = model.area > 0.0 ? std::sqrt(model.area / area) : 1.0;
+    Mesh mesh = polygonsOf(level, float(side), thinning);
+    for (Vec3& p : mesh.positions) p = glm::clamp(p, model.bounds.min, model.bounds.max);
+    return mesh;
 }
 
 }  // namespace
 
 ChildRef addSurfelModel(Scene& scene, SurfelModel model, const std::string& name) {
+    measureDiscs(model);
     Mesh mesh = standInMesh(model);
     mesh.name = name;
     mesh.first_finish = uint32_t(scene.materials.size());
@@ -119,9 +180,14 @@ ChildRef addSurfelModel(Scene& scene, SurfelModel model, const std::string& name
 ChildRef loadSurfelModel(const std::filesystem::path& path, const std::string& name, Scene& scene,
                          LoadContext& context) {
     const std::string text = readFile(path, context.budget, name);
-    if (modelBody(text, name).version == kHybridVersion)
-        return addHybridModel(scene, parseHybridFile(text, context.budget, name), name);
-    return addSurfelModel(scene, parseSurfelFile(text, context.budget, name), name);
+    const ModelBody body = modelBody(text, name);
+    if (body.version == kHybridVersion)
+        return addHybridModel(scene, parseHybridBody(body, context.budget, name), name);
+    SurfelModel model = parseSurfelBody(body, context.budget, name);
+    context.budget.take(
+        standInBytes(model), name,
+        "the mesh that stands for " + std::to_string(model.levels[0].size()) + " points or splats");
+    return addSurfelModel(scene, std::move(model), name);
 }
 
 }  // namespace stipple

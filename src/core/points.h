@@ -6,6 +6,7 @@
 #pragma once
 
 #include <core/camera.h>
+#include <core/disc_cuts.h>
 #include <core/parallel.h>
 #include <core/settings.h>
 #include <core/surface.h>
@@ -86,9 +87,9 @@ inline constexpr float kOpaqueAlpha = 254.5f / 255.0f;
 struct DiscShape {
     // Half axes, or what an affine map made of them, in camera space; scaled to span an area of 1.
     std::array<Vec3, 2> axis = {Vec3(1, 0, 0), Vec3(0, 1, 0)};
-    static constexpr int kMostCuts = 4;
     int n_cuts = 0;
-    std::array<Vec3, kMostCuts> cuts = {};  // there is surface where x u + y v <= z, u and v in m
+    std::array<Vec3, kMostDiscCuts> cuts =
+        {};  // there is surface where x u + y v <= z, u and v in m
 
     bool hasSurface(float u, float v) const {
         for (int i = 0; i < n_cuts; ++i) {

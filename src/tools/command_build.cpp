@@ -208,7 +208,8 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
     bool allow_outside = false, quiet = false;
     int threads = 0;
     uint64_t memory_limit_mb = 0;
-    app.add_option("ASSET", input, "*.scene.json, .gltf, .glb, .ply or .obj")
+    app.add_option("ASSET", input,
+                   "*.scene.json, .gltf, .glb, .ply or .obj, without models of points")
         ->required()
         ->group("Arguments");
     app.add_option("--as", kind, "the kind of model: point-blocks, splats or hybrid")
@@ -257,6 +258,15 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
         loadScene(input, {allow_outside, memory_limit_mb, &cancel}, pool, diagnostics);
     throwIfCancelled(cancel);
     progress.finish();
+    for (const Mesh& mesh : scene.meshes) {
+        // Hybrids have the whole mesh that they were made from.
+        if (mesh.surfels && !mesh.is_patch) {
+            throw Error(ErrorCode::kUnsupported, input,
+                        "'" + mesh.name +
+                            "' is a model of points: build from what it was made from, not from "
+                            "the mesh that stands for it");
+        }
+    }
     for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
 
     Built built;

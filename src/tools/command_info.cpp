@@ -20,13 +20,41 @@ using Json = nlohmann::ordered_json;
 const HelpText kHelp = {"stipple info SCENE [--json] [--export FILE]",
                         "Prints what is in a scene: instances, unique and expanded triangles, "
                         "memory, groups with their "
-                        "depth, cameras, paths and materials.",
+                        "depth, cameras, paths and materials; of models of points (.stipple) what "
+                        "they are, what they were made from, and how many points they have.",
                         {"stipple info scenes/forest.scene.json", "stipple info tree.glb --json",
                          "stipple info wood.scene.json --export wood.glb"}};
 
 Json boxJson(const DBox3& box) {
     if (box.isEmpty()) return nullptr;
     return {{"min", {box.min.x, box.min.y, box.min.z}}, {"max", {box.max.x, box.max.y, box.max.z}}};
+}
+
+// Of a model of points; null for meshes.
+Json modelJson(const Scene& scene, const Mesh& mesh) {
+    std::vector<const SurfelModel*> models;
+    if (mesh.surfels) models.push_back(mesh.surfels.get());
+    for (const MeshPatch& patch : mesh.patches) {
+        if (patch.surfels != MeshPatch::kNoMesh)
+            models.push_back(scene.meshes[patch.surfels].surfels.get());
+    }
+    if (models.empty() && mesh.patches.empty()) return nullptr;
+    size_t surfels = 0, surfels_all_levels = 0, levels = 0;
+    float spacing = kInfinity;
+    for (const SurfelModel* model : models) {
+        surfels += model->levels[0].size();
+        for (const SurfelLevel& level : model->levels) surfels_all_levels += level.size();
+        levels = std::max(levels, model->levels.size());
+        spacing = std::min(spacing, model->levels[0].spacing);
+    }
+    Json json = {{"kind", mesh.surfels ? mesh.surfels->kind : "hybrid"},
+                 {"source", mesh.surfels ? mesh.surfels->source : mesh.patches_source},
+                 {"surfels", surfels},
+                 {"surfels_all_levels", surfels_all_levels},
+                 {"levels", levels},
+                 {"spacing", models.empty() ? Json() : Json(spacing)}};
+    if (!mesh.surfels) json["patches"] = mesh.patches.size();
+    return json;
 }
 
 Json infoJson(const Scene& scene, const std::vector<std::string>& warnings) {
@@ -60,6 +88,8 @@ Json infoJson(const Scene& scene, const std::vector<std::string>& warnings) {
                                   {"instances", jsonCount(shown[i])},
                                   {"vertices", mesh.positions.size()},
                                   {"bytes", mesh.bytes()}});
+        if (const Json model = modelJson(scene, mesh); !model.is_null())
+            json["assets"].back()["model"] = model;
     }
     json["cameras"] = Json::array();
     for (const Camera& camera : scene.cameras) json["cameras"].push_back(camera.name);
@@ -86,8 +116,11 @@ std::string groupedDigits(double count) {
 }
 
 // "1 group", "1,025 groups"
-std::string counted(double count, const std::string& noun) {
-    return groupedDigits(count) + " " + noun + (count == 1.0 ? "" : "s");
+std::string counted(double count, const std::string& noun, const std::string& plural = "") {
+    return groupedDigits(count) + " " +
+           (count == 1.0     ? noun
+            : plural.empty() ? noun + "s"
+                             : plural);
 }
 
 std::string byteSize(double bytes) {
@@ -100,10 +133,32 @@ std::string byteSize(double bytes) {
 std::string joinNames(const Json& names) {
     constexpr size_t kMostNames = 20;
     std::string text = std::to_string(names.size());
-    for (size_t i = 0; i < names.size() && i < kMostNames; ++i) {
-        text += (i == 0 ? ": " : ", ") + names[i].get<std::string>();
+    size_t n_named = 0, n_unnamed = 0;
+    for (const Json& name : names) {
+        if (name.get<std::string>().empty()) {
+            ++n_unnamed;
+        } else if (n_named++ < kMostNames) {
+            text += (n_named == 1 ? ": " : ", ") + name.get<std::string>();
+        }
     }
-    return text + (names.size() > kMostNames ? ", ..." : "");
+    if (n_named > kMostNames) text += ", ...";
+    if (n_unnamed == 0) return text;
+    return text + (n_named == 0 ? ", unnamed" : ", " + std::to_string(n_unnamed) + " unnamed");
+}
+
+// "splats of scan.ply, 2,518 at 1 level, 0.003 m apart; 10,072 triangles stand for them"
+std::string modelLine(const Json& model, const std::string& triangles) {
+    const std::string kind = model["kind"], source = model["source"];
+    std::string text = kind + (source.empty() ? "" : " of " + source) + ", ";
+    if (model.contains("patches")) text += counted(model["patches"], "patch", "patches") + ", ";
+    text += counted(model["surfels"], kind == "splats" ? "splat" : "point");
+    if (!model["spacing"].is_null()) {
+        char spacing[32];
+        std::snprintf(spacing, sizeof spacing, "%.3g", model["spacing"].get<double>());
+        text += " (" + counted(model["levels"], "level") + ", the finest " + spacing + " m apart)";
+    }
+    return text +
+           (kind == "hybrid" ? ", " + triangles : "; far away " + triangles + " stand for it");
 }
 
 void printInfo(const Json& info) {
@@ -129,8 +184,9 @@ void printInfo(const Json& info) {
     }
     out << "assets\n";
     for (const Json& asset : info["assets"]) {
+        const std::string triangles = counted(asset["triangles"], "triangle");
         out << "  " << asset["name"].get<std::string>() << ": "
-            << counted(asset["triangles"], "triangle") << ", "
+            << (asset.contains("model") ? modelLine(asset["model"], triangles) : triangles) << ", "
             << counted(asset["instances"], "instance") << ", " << byteSize(asset["bytes"]) << "\n";
     }
 }
@@ -164,7 +220,15 @@ ExitCode runInfo(const std::vector<std::string>& arguments) {
     const Scene scene = loadScene(path, load_options, pool, diagnostics);
     throwIfCancelled(cancel);
     for (const std::string& warning : diagnostics.warnings) printMessage("warning: " + warning);
-    if (!export_path.empty()) saveSceneGltf(export_path, scene);
+    if (!export_path.empty()) {
+        for (const Mesh& mesh : scene.meshes) {
+            if (mesh.surfels && !mesh.is_patch)
+                printMessage("warning: " + mesh.name +
+                             ": a model of points, of which the mesh that stands for it far away "
+                             "is written");
+        }
+        saveSceneGltf(export_path, scene);
+    }
     const Json info = infoJson(scene, diagnostics.warnings);
     if (as_json) {
         std::cout << info.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";

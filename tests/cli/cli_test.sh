@@ -995,6 +995,12 @@ case_build() {
     grep -q '"points_per_pixel"' built.json || fail "no report"
     expect_ok render ball.stipple -o ball.png "${tiny[@]}"
     expect_ok info ball.stipple
+    expect_stdout 'point-blocks of scene\.scene\.json, [0-9,]+ points \([0-9]+ levels, the finest 0\.[0-9]+ m apart\); far away [0-9,]+ triangles stand for it'
+    expect_ok info ball.stipple --json --export ball.glb
+    expect_stdout '"kind": "point-blocks"'
+    expect_stdout '"surfels_all_levels": '
+    grep -q 'warning: ball\.stipple: a model of points' stderr.txt || fail "no warning"
+    expect_error 3 "'ball\.stipple' is a model of points" build ball.stipple --as splats -o again.stipple
     # As an asset of a scene, instanced.
     cat >many.scene.json <<JSON
 { "version": 1, "assets": { "ball": { "file": "ball.stipple" } }, "root": "many",
@@ -1011,6 +1017,7 @@ case_build_hybrid() {
     expect_ok render ball.stipple -o ball.png "${tiny[@]}"
     expect_ok render scene.scene.json -o source.png "${tiny[@]}"
     expect_ok info ball.stipple
+    expect_stdout 'hybrid of scene\.scene\.json, [0-9]+ patch(es)?, [0-9,]+ points'
     # As an asset of a scene, instanced, with every reconstruction and by rays.
     cat >many.scene.json <<JSON
 { "version": 1, "assets": { "ball": { "file": "ball.stipple" } }, "root": "many",

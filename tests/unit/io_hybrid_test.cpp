@@ -197,8 +197,8 @@ TEST(HybridFile, comesBackAsItWas) {
     EXPECT_EQ(read.textures.size(), model.textures.size());
 }
 
-std::string errorOf(const std::string& text) {
-    MemoryBudget budget(0);
+std::string errorOf(const std::string& text, uint64_t limit_mb = 0) {
+    MemoryBudget budget(limit_mb);
     try {
         HybridModel model = parseHybridFile(text, budget, "m.stipple");
         // What passes can be shown.
@@ -258,6 +258,47 @@ TEST(HybridFile, refusesWhatIsDamaged) {
     std::string newer = text;
     newer[8] = 9;
     EXPECT_NE(errorOf(newer).find("has version 9"), std::string::npos);
+}
+
+TEST(HybridFile, namesHaveNoControlCharacters) {
+    HybridModel model = build(sceneOf(makeRock({})), HybridOptions());
+    model.textures.resize(1);
+    model.textures[0].levels.push_back({1, 1, std::vector<uint8_t>(4)});
+    model.source = model.materials[0].name = model.textures[0].name = "a\x1b[2J\n";
+    MemoryBudget budget(0);
+    const HybridModel read = parseHybridFile(hybridFileText(model), budget, "rock.stipple");
+    for (const std::string& name : {read.source, read.materials[0].name, read.textures[0].name}) {
+        EXPECT_EQ(name[0], 'a');
+        for (const char c : name) EXPECT_GE(c, ' ');
+    }
+}
+
+// Each patch is a mesh with its own copies of vertices and finishes.
+TEST(HybridFile, memoryIsReservedForWhatPatchesBecome) {
+    HybridModel model = build(sceneOf(torus(300)), HybridOptions());
+    HybridModel layers = model;
+    layers.mesh.more_uvs.resize(8);
+    EXPECT_EQ(errorOf(hybridFileText(layers), 5), "");
+    layers.mesh.more_uvs.resize(9);
+    EXPECT_NE(errorOf(hybridFileText(layers)).find("more than 8 further layers"),
+              std::string::npos);
+
+    HybridModel small = model;  // of one triangle each
+    HybridPatch patch;
+    patch.triangles.push_back({0.0f, {small.triangles[0]}, {small.triangle_material[0]}});
+    small.patches.assign(20000, patch);
+    ASSERT_LT(hybridFileText(small).size(), 2000000u);
+    EXPECT_NE(errorOf(hybridFileText(small), 10).find("20000 patches need about"),
+              std::string::npos);
+    EXPECT_EQ(errorOf(hybridFileText(small), 40), "");
+
+    HybridModel finishes = model;
+    finishes.finishes.resize(256, finishes.finishes[0]);
+    patch.triangles.clear();
+    patch.surfels = {model.patches[0].surfels.back()};
+    finishes.patches.assign(1000, patch);
+    EXPECT_NE(errorOf(hybridFileText(finishes), 20).find("1000 patches need about"),
+              std::string::npos);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Splats from point clouds: every point lies within the tolerance of a splat, there are far fewer
+// Splats from point clouds: every point lies within the tolerance of a splat, but for
+// the steps that positions are kept in, there are far fewer
 // of them, they face outwards, and odd clouds are handled.
 #include <core/rng.h>
 #include <gtest/gtest.h>
@@ -79,6 +80,36 @@ TEST(Splats, normalsTurnWithTheSurface) {
     EXPECT_LT(of_fields / n, 1.0);
 }
 
+// Of positions: they are rounded to half of it.
+double longestStep(const SurfelModel& model) {
+    float longest = 0.0f;
+    for (const SurfelBlock& block : model.levels[0].blocks)
+        longest = std::max(longest, glm::length(SurfelLevel::step(block)));
+    return double(longest);
+}
+
+// Positions are kept in steps of blocks, which end where nothing is.
+TEST(Splats, reportSaysHowFarPointsAreFromWhatTheModelKeeps) {
+    std::vector<std::string> lines;
+    Rng rng{4};
+    for (int object = 0; object < 40; ++object) {
+        const double x = rng.uniform(-500, 500), y = rng.uniform(-5, 5), z = rng.uniform(-500, 500);
+        for (int i = 0; i < 25; ++i) {
+            lines.push_back(std::to_string(x + 0.05 * (i % 5)) + " " + std::to_string(y) + " " +
+                            std::to_string(z + 0.05 * (i / 5)));
+        }
+    }
+    const Scene scene = cloudScene(lines, "");
+    SplatOptions options;
+    options.tolerance = 0.001;  // of 1.4 km
+    SplatReport report;
+    const SurfelModel model = build(scene, options, report);
+    EXPECT_GT(report.largest_distance, 0.0);
+    EXPECT_LE(report.largest_distance, 0.01);
+    for (const SurfelBlock& block : model.levels[0].blocks)
+        EXPECT_LT(glm::length(block.bounds.extent()), 40.0f);
+}
+
 TEST(Splats, coverASphereWithinTheToleranceAndFaceOutwards) {
     const Scene scene = cloudScene(spherePoints(20000), "");
     SplatOptions options;
@@ -86,12 +117,12 @@ TEST(Splats, coverASphereWithinTheToleranceAndFaceOutwards) {
     options.tolerance = 0.2;
     const SurfelModel model = build(scene, options, coarse);
     EXPECT_EQ(coarse.points, 20000u);
-    EXPECT_LE(coarse.largest_distance, coarse.tolerance * 1.0001);
+    EXPECT_LE(coarse.largest_distance, coarse.tolerance + longestStep(model));
     EXPECT_LT(coarse.splats, 2000u);
     options.tolerance = 0.05;
-    build(scene, options, fine);
+    const SurfelModel fine_model = build(scene, options, fine);
     EXPECT_GT(fine.splats, 2 * coarse.splats);
-    EXPECT_LE(fine.largest_distance, fine.tolerance * 1.0001);
+    EXPECT_LE(fine.largest_distance, fine.tolerance + longestStep(fine_model));
     const SurfelLevel& level = model.levels[0];
     for (const SurfelBlock& block : level.blocks) {
         for (uint32_t i = block.first; i < block.first + block.count; ++i) {

@@ -2,10 +2,16 @@
 // Prebuilt models: what is packed comes back, and files that are damaged in any way are refused.
 #include <core/rng.h>
 #include <gtest/gtest.h>
+#include <render/renderer.h>
 #include <scenegraph/disc_planes.h>
+#include <scenegraph/io/load.h>
 #include <scenegraph/io/surfel_file.h>
 
+#include <unistd.h>
+
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 
 namespace stipple {
 namespace {
@@ -25,7 +31,7 @@ std::vector<Surfel> ball(int n) {
         s.ratio = 0.25f + 0.15f * float(i % 6);
         s.shading_normal = p;
         s.bend = Vec3(0.5f, 0.25f, -0.125f);
-        s.n_cuts = i % (kMostSurfelCuts + 1);
+        s.n_cuts = i % (kMostDiscCuts + 1);
         for (int c = 0; c < s.n_cuts; ++c)
             s.cuts[size_t(c)] = Vec3(std::cos(a + float(c)), std::sin(a + float(c)), 0.3f);
         surfels.push_back(s);
@@ -67,7 +73,33 @@ TEST(SurfelModel, packedSurfelsComeBackWithinTheirSteps) {
     EXPECT_GT(double(level.size()) / double(level.blocks.size()), 28.0);  // blocks are well filled
 }
 
-// Nothing of a block may be seen from where its cone says so.
+// Few surfels each, so that blocks would go on from one to the next.
+TEST(SurfelModel, whatLiesFarApartKeepsItsPlaces) {
+    for (const SurfelDiscs discs : {SurfelDiscs::kAlike, SurfelDiscs::kShapes}) {
+        std::vector<Surfel> surfels;
+        Rng rng{9};
+        for (int object = 0; object < 40; ++object) {
+            const Vec3 at(float(rng.uniform(-500, 500)), 0.0f, float(rng.uniform(-500, 500)));
+            for (Surfel& s : ball(5)) {
+                s.position = at + s.normal * 0.1f;
+                surfels.push_back(s);
+            }
+        }
+        constexpr float kSpacing = 0.05f;
+        std::vector<uint32_t> place;
+        const SurfelLevel level =
+            packSurfels(surfels, std::vector<SurfelFinish>(2), kSpacing, discs, &place);
+        std::vector<Surfel> kept;
+        for (const SurfelBlock& block : level.blocks) {
+            for (uint32_t i = block.first; i < block.first + block.count; ++i)
+                kept.push_back(unpackSurfel(level, block, i));
+        }
+        ASSERT_EQ(place.size(), surfels.size());
+        for (size_t i = 0; i < surfels.size(); ++i)
+            EXPECT_LT(glm::length(kept[place[i]].position - surfels[i].position), 0.03f * kSpacing);
+    }
+}
+
 // Points a spacing apart on a plane, or on a line in it, with one shading normal that is not its.
 std::vector<float> cosinesToPlane(const Vec3& plane, const Vec3& shading, int columns) {
     Vec3 u, v;
@@ -114,6 +146,7 @@ TEST(SurfelModel, discsLieInTheSurfaceWhateverItsShadingNormal) {
     }
 }
 
+// Nothing of a block may be seen from where its cone says so.
 TEST(SurfelModel, conesHideWhatFacesAway) {
     const SurfelModel model = ballModel(SurfelDiscs::kAlike);
     Rng rng{3};
@@ -245,10 +278,29 @@ TEST(SurfelFile, comesBackAsItWas) {
     }
 }
 
-std::string errorOf(const std::string& text) {
+// Small pictures from near and far.
+void draw(const Scene& scene, ThreadPool& pool) {
+    Renderer renderer(scene, pool);
+    for (const double distance : {1.0, 4.0, 1000.0}) {
+        FrameRequest request;
+        request.camera = lookAt(DVec3(5.0, 0.0, 2.0 + distance), DVec3(5.0, 0.0, 0.0));
+        request.settings.width = request.settings.height = 16;
+        renderer.render(request);
+    }
+}
+
+std::string errorOf(const std::string& text, ThreadPool* pool = nullptr) {
     MemoryBudget budget(0);
     try {
-        parseSurfelFile(text, budget, "m.stipple");
+        SurfelModel model = parseSurfelFile(text, budget, "m.stipple");
+        if (!pool) return "";
+        // What passes can be shown.
+        Scene scene;
+        scene.groups.emplace_back();
+        scene.groups[0].instances.add(addSurfelModel(scene, std::move(model), "m.stipple"),
+                                      Affine());
+        buildScene(scene, *pool);
+        draw(scene, *pool);
     } catch (const Error& error) {
         EXPECT_NE(error.code(), ErrorCode::kInternal);
         return error.what();
@@ -290,19 +342,73 @@ TEST_P(DamagedFile, isRefused) {
         flipped[size_t(rng.uniform(0, double(text.size())))] ^= char(1 << int(rng.uniform(0, 8)));
         EXPECT_NE(errorOf(flipped), "");
     }
-    // Behind a checksum that fits anything may stand: an error or a model, but no crash.
+    // Behind a checksum that fits anything may stand: an error or a model that can be drawn.
+    ThreadPool pool(2);
     for (int i = 0; i < 2000; ++i) {
         std::string forged = text;
         for (int k = 0; k < 3; ++k)
             forged[32 + size_t(rng.uniform(0, double(i % 2 ? 400 : text.size() - 32)))] =
                 char(rng.next());
-        errorOf(withChecksum(forged));
+        errorOf(withChecksum(forged), &pool);
         errorOf(
             withChecksum(forged.substr(0, 32 + size_t(rng.uniform(0, double(text.size() - 32))))));
     }
     std::string newer = text;
     newer[8] = 9;
     EXPECT_NE(errorOf(newer).find("has version 9"), std::string::npos);
+}
+
+// What stands for splats are polygons as large as they; memory is reserved for them, and there are
+// no more than 40 000.
+TEST(SurfelFile, meshThatStandsForSplatsIsWithinTheMemoryLimit) {
+    SurfelModel model = ballModel(SurfelDiscs::kShapes);
+    model.levels = {packSurfels(ball(60000), model.finishes, 0.05f, SurfelDiscs::kShapes)};
+    const std::filesystem::path path =
+        std::filesystem::temp_directory_path() /
+        ("stipple-stand-in-" + std::to_string(getpid()) + ".stipple");
+    std::ofstream(path, std::ios::binary) << surfelFileText(model);
+    ThreadPool pool(2);
+    Diagnostics diagnostics;
+    try {
+        loadScene(path.string(), {true, 10, nullptr}, pool, diagnostics);
+        ADD_FAILURE() << "it was loaded";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory);
+        EXPECT_NE(std::string(error.what()).find("the mesh that stands for 60000"),
+                  std::string::npos);
+    }
+    const Scene scene = loadScene(path.string(), {true, 60, nullptr}, pool, diagnostics);
+    std::filesystem::remove(path);
+    EXPECT_LE(scene.meshes[0].triangles.size(), 40000u * 8);
+    EXPECT_GE(scene.meshes[0].triangles.size(), 40000u * 2);
+}
+
+// They reach messages and the terminal.
+TEST(SurfelFile, namesHaveNoControlCharacters) {
+    SurfelModel model = ballModel(SurfelDiscs::kAlike);
+    model.source = "ball\x1b[31m\n.ply";
+    model.finishes[0].material.name = "red\a\r";
+    MemoryBudget budget(0);
+    const SurfelModel read = parseSurfelFile(surfelFileText(model), budget, "ball.stipple");
+    for (const std::string& name : {read.source, read.finishes[0].material.name}) {
+        EXPECT_FALSE(name.empty());
+        for (const char c : name) EXPECT_GE(c, ' ');
+    }
+}
+
+// Points know their level as a small number.
+TEST(SurfelFile, withMoreLevelsThanBuildersMakeIsRefused) {
+    SurfelModel model = ballModel(SurfelDiscs::kAlike);
+    model.levels.erase(model.levels.begin());
+    const SurfelLevel level =
+        packSurfels(ball(3), model.finishes, model.levels[0].spacing, SurfelDiscs::kAlike);
+    model.levels.insert(model.levels.end(), kMostSurfelLevels - 1, level);
+    ThreadPool pool(2);
+    EXPECT_EQ(errorOf(surfelFileText(model), &pool), "");
+    for (const size_t more : {size_t(kMostSurfelLevels) + 1, size_t(33000), size_t(65538)}) {
+        model.levels.resize(more, level);
+        EXPECT_EQ(errorOf(surfelFileText(model), &pool), "m.stipple: has more than 64 levels");
+    }
 }
 
 }  // namespace
