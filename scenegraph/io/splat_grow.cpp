@@ -10,6 +10,7 @@ namespace stipple {
 namespace {
 
 constexpr float kFacing = 0.2f;  // cosine: what is turned more lies on another side
+constexpr float kBack = -0.7f;   // what is turned more lies behind
 // Thinner ellipses would stand for what noise there is, and need more triangles than they save.
 constexpr float kThinnest = 0.25f;
 // No place of a surface is farther from a point than about this many spacings.
@@ -157,6 +158,8 @@ SplatGrower::Grown SplatGrower::growIn(uint32_t seed, const Frame& frame, float 
                     std::abs(p.height) > 2.0f * (center.spacing + rules_.tolerance))
                     continue;
                 if (cut(grown, seed, p)) continue;
+                // The back of a sheet that is as thin as that.
+                if (facing < kBack && point.is_facing) continue;
                 grown.is_ended = true;
                 break;
             }

@@ -117,6 +117,7 @@ private:
         const auto add = [&](const Vec3& p, const Vec3& normal, const Vec3& albedo,
                              uint16_t material) {
             SplatPoint point;
+            point.is_facing = !mesh.is_cloud;
             point.position = Vec3(world_from_object.point(DVec3(p)) - middle_);
             point.normal = Vec3(glm::normalize(area_map * DVec3(normal) * side));
             for (int k = 0; k < 3; ++k)
@@ -158,8 +159,10 @@ private:
                 surfaceAt(mesh, scene_.materials, scene_.textures, uint32_t(t), a, b, {});
             const Vec3 flat = glm::cross(mesh.positions[v.y] - mesh.positions[v.x],
                                          mesh.positions[v.z] - mesh.positions[v.x]);
-            add(p, glm::dot(flat, surface.normal_object) < 0.0f ? -flat : flat, surface.albedo,
-                mesh.triangle_material[t]);
+            // Single-sided surfaces are seen from the side that their winding says.
+            const bool is_turned = scene_.materials[mesh.triangle_material[t]].double_sided &&
+                                   glm::dot(flat, surface.normal_object) < 0.0f;
+            add(p, is_turned ? -flat : flat, surface.albedo, mesh.triangle_material[t]);
         }
     }
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <scenegraph/io/load.h>
 #include <scenegraph/io/splats.h>
+#include <tests/image/test_scene.h>
 
 #include <unistd.h>
 
@@ -100,6 +101,57 @@ TEST(Splats, coloursAreKept) {
             EXPECT_GT(s.position.x < 0.495f ? s.albedo.r : s.albedo.b, 0.9f);
         }
     }
+}
+
+// Spheres that run into each other, one of them small and low: whoever guesses from the points
+// where outside is turns some inside out.
+TEST(Splats, surfacesFaceAsTheirMeshesDo) {
+    const std::vector<std::pair<DVec3, double>> spheres = {{{0, 2, 0}, 2.0},
+                                                           {{0.7, 1.1, 0.2}, 1.2},
+                                                           {{-0.6, 1.0, 0.5}, 1.1},
+                                                           {{0.1, 0.2, 0.6}, 0.8},
+                                                           {{3, 0, 0}, 1.0}};
+    TestScene scene;
+    // The last is mirrored.
+    for (const auto& [center, size] : spheres)
+        scene.add(makePrimitive("sphere", 200, Vec3(0.5f)),
+                  placed(center, DVec3(center.x < 3.0 ? size : -size, size, size)));
+    SplatOptions options;
+    options.points = 5000;
+    SplatReport report;
+    const SurfelModel model = build(scene.build(), options, report);
+    EXPECT_EQ(report.points, 25000u);
+    const SurfelLevel& level = model.levels[0];
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            // Of one of those that it lies on.
+            double most = -1.0;
+            for (const auto& [center, size] : spheres) {
+                const DVec3 d = DVec3(s.position) - center;
+                if (std::abs(glm::length(d) - 0.5 * size) < 0.05)
+                    most = std::max(most, glm::dot(DVec3(s.normal), d));
+            }
+            EXPECT_GT(most, 0.0) << i;
+        }
+    }
+}
+
+// Two sides of a leaf, each of its own: neither ends where the other is.
+TEST(Splats, sheetsBackToBackAreFewSplats) {
+    TestScene scene;
+    scene.add(makePrimitive("plane", 200, Vec3(0.5f)), Affine());
+    Affine turned;
+    turned.linear = DMat3(1, 0, 0, 0, -1, 0, 0, 0, -1);
+    scene.add(makePrimitive("plane", 200, Vec3(0.5f)), turned);
+    scene.build();
+    for (Material& material : scene.scene.materials) material.double_sided = false;
+    SplatOptions options;
+    options.points = 5000;
+    SplatReport report;
+    const SurfelModel model = build(scene.scene, options, report);
+    EXPECT_GE(report.splats, 2u);
+    EXPECT_LE(report.splats, 40u);
 }
 
 TEST(Splats, oddCloudsAreHandled) {
