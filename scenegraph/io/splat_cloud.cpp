@@ -210,7 +210,7 @@ void SplatCloud::coverUncovered() {
         for (size_t c = 0; c < n_tried; ++c) {
             const uint32_t seed = uncovered_[(2 * c + 1) * n / (2 * n_tried)];
             const Splat splat = grower.grow(seed, std::clamp(2 * n, kFewest, kMostCovered));
-            findCovered(splat, points_, index_, rules_, near_, covered);
+            findCovered(splat, points_, index_, rules_, covered);
             if (std::find(covered.begin(), covered.end(), seed) == covered.end())
                 covered.push_back(seed);
             size_t gain = 0;

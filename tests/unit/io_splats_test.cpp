@@ -154,6 +154,45 @@ TEST(Splats, sheetsBackToBackAreFewSplats) {
     EXPECT_LE(report.splats, 40u);
 }
 
+// A disc as thin as the tolerance, soon: its other side is no reason for smaller splats, nor is a
+// tolerance larger than what was looked at.
+TEST(Splats, areNoMoreWhereTheToleranceIsLarger) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < 8000; ++i) {
+        const double z = 1.0 - (2.0 * i + 1.0) / 8000, a = 2.399963 * i, r = std::sqrt(1 - z * z);
+        lines.push_back(std::to_string(r * std::cos(a)) + " " + std::to_string(0.15 * z) + " " +
+                        std::to_string(r * std::sin(a)));
+    }
+    const Scene scene = cloudScene(lines, "");
+    uint64_t before = 1000;
+    for (const double tolerance : {0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 50.0}) {
+        SplatOptions options;
+        options.tolerance = tolerance;
+        SplatReport report;
+        build(scene, options, report);
+        EXPECT_LE(report.splats, before + before / 20 + 2) << tolerance;
+        EXPECT_LE(report.largest_distance, report.tolerance * 1.0001);
+        before = report.splats;
+    }
+    EXPECT_LE(before, 60u);
+}
+
+// What is small and finely sampled lies within a few points' distance on what is large.
+TEST(Splats, smallThingsOnALargePlaneAreFew) {
+    TestScene scene;
+    scene.add(makePrimitive("plane", 2, Vec3(0.5f)), placed(DVec3(0.0), DVec3(40.0)));
+    for (int i = 0; i < 4; ++i) {
+        scene.add(makePrimitive("torus", 2000, Vec3(0.5f)),
+                  placed(DVec3(1.5 * i, 0.15, 0), DVec3(0.5)));
+    }
+    SplatOptions options;
+    options.points = 20000;
+    SplatReport report;
+    build(scene.build(), options, report);
+    EXPECT_EQ(report.points, 100000u);
+    EXPECT_LE(report.splats, 300u);
+}
+
 TEST(Splats, oddCloudsAreHandled) {
     SplatReport report;
     // On a line, all at one place, a single one, and a few.
