@@ -6,8 +6,41 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <queue>
+#include <tuple>
 
 namespace stipple {
+
+size_t joinSamePlaces(SplatPoints& points) {
+    constexpr size_t kMostAtOnePlace = 8;
+    constexpr float kAlike = 0.9f;  // cosine
+    std::vector<uint32_t> order(points.size());
+    for (uint32_t i = 0; i < points.size(); ++i) order[i] = i;
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        const Vec3 &p = points[a].position, &q = points[b].position;
+        return std::tie(p.x, p.y, p.z, a) < std::tie(q.x, q.y, q.z, b);
+    });
+    std::vector<uint8_t> goes(points.size(), 0);
+    std::vector<uint32_t> kept;  // at the place
+    for (const uint32_t i : order) {
+        const SplatPoint& point = points[i];
+        if (!kept.empty() && points[kept[0]].position != point.position) kept.clear();
+        goes[i] = kept.size() == kMostAtOnePlace ||
+                  std::any_of(kept.begin(), kept.end(), [&](uint32_t k) {
+                      const SplatPoint& other = points[k];
+                      return other.finish == point.finish &&
+                             (other.normal == point.normal ||
+                              glm::dot(other.normal, point.normal) > kAlike);
+                  });
+        if (!goes[i]) kept.push_back(i);
+    }
+    size_t to = 0;
+    for (size_t i = 0; i < points.size(); ++i) {
+        if (!goes[i]) points[to++] = points[i];
+    }
+    const size_t n_gone = points.size() - to;
+    points.resize(to);
+    return n_gone;
+}
 
 void fitPlane(SplatPoints& points, const PointIndex& index, int neighbours, uint32_t i,
               std::vector<NearPoint>& near) {

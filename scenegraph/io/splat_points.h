@@ -23,6 +23,10 @@ struct SplatPoint {
 
 using SplatPoints = std::vector<SplatPoint>;
 
+// Of points at the very same place that face alike and have one finish, the first stays; so do the
+// first few that do not. Returns how many go. O(n log n).
+size_t joinSamePlaces(SplatPoints& points);
+
 // Fits a plane to the `neighbours` nearest points of point i: spacing, roughness and, where the
 // neighbours have a plane, the normal (unless it is facing), on the side of the normal there was.
 // `near`: scratch.

@@ -58,6 +58,7 @@ public:
         const DBox3 bounds = sceneBounds(scene_);
         middle_ = bounds.isEmpty() ? DVec3(0.0) : 0.5 * (bounds.min + bounds.max);
         gather(scene_.root, Affine(), 0);
+        report.same_places = joinSamePlaces(points_);
         if (points_.empty())
             throw Error(ErrorCode::kInvalidScene, scene_.path, "has no points to make splats of");
         const double diagonal = glm::length(bounds.max - bounds.min);
@@ -119,7 +120,9 @@ private:
             SplatPoint point;
             point.is_facing = !mesh.is_cloud;
             point.position = Vec3(world_from_object.point(DVec3(p)) - middle_);
-            point.normal = Vec3(glm::normalize(area_map * DVec3(normal) * side));
+            const DVec3 facing = area_map * DVec3(normal) * side;
+            if (!(glm::length(facing) > 0.0)) return;  // of no area in the world
+            point.normal = Vec3(glm::normalize(facing));
             for (int k = 0; k < 3; ++k)
                 point.color[k] = srgbFromLinear(std::clamp(albedo[k], 0.0f, 1.0f));
             point.finish = finishOf(material);

@@ -131,6 +131,11 @@ public:
         SplatReport r;
         SurfelModel model = buildSplats(job.scene, options_, job.pool, job.cancel, job.progress, r);
         model.source = job.source;
+        if (r.same_places > 0) {
+            printMessage("warning: " + job.source + ": " + std::to_string(r.same_places) +
+                         " points are left out: others lie at the very same places; the first of "
+                         "each is kept");
+        }
         Built built;
         built.text = surfelFileText(model);
         built.report = surfelReport(model, built.text.size());
@@ -140,6 +145,7 @@ public:
             r.largest_distance, r.mean_distance);
         built.report.update({{"seconds", r.seconds},
                              {"points", r.points},
+                             {"same_places", r.same_places},
                              {"tolerance", r.tolerance},
                              {"largest_distance", r.largest_distance},
                              {"mean_distance", r.mean_distance}});

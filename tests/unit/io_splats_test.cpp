@@ -193,6 +193,22 @@ TEST(Splats, smallThingsOnALargePlaneAreFew) {
     EXPECT_LE(report.splats, 300u);
 }
 
+TEST(Splats, whatIsThereTwiceCountsOnce) {
+    TestScene once, twice;
+    once.add(makePrimitive("torus", 200, Vec3(0.5f)), Affine());
+    twice.add(makePrimitive("torus", 200, Vec3(0.5f)), Affine());
+    twice.root.instances.add(ChildRef::mesh(0), Affine());
+    SplatOptions options;
+    options.points = 2000;
+    SplatReport of_once, of_twice;
+    build(once.build(), options, of_once);
+    build(twice.build(), options, of_twice);
+    EXPECT_EQ(of_once.same_places, 0u);
+    EXPECT_EQ(of_twice.same_places, 2000u);
+    EXPECT_EQ(of_twice.points, 2000u);
+    EXPECT_EQ(of_twice.splats, of_once.splats);
+}
+
 TEST(Splats, oddCloudsAreHandled) {
     SplatReport report;
     // On a line, all at one place, a single one, and a few.
