@@ -4,11 +4,13 @@
 #include <core/image.h>
 #include <core/option_text.h>
 #include <core/stopwatch.h>
+#include <scenegraph/io/load_context.h>
 #include <scenegraph/io/splat_choice.h>
 #include <scenegraph/io/splat_pack.h>
 #include <scenegraph/surface_at.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <map>
 
 namespace stipple {
@@ -57,6 +59,7 @@ public:
         const Stopwatch watch;
         const DBox3 bounds = sceneBounds(scene_);
         middle_ = bounds.isEmpty() ? DVec3(0.0) : 0.5 * (bounds.min + bounds.max);
+        requireFewPoints();
         gather(scene_.root, Affine(), 0);
         report.same_places = joinSamePlaces(points_);
         if (points_.empty())
@@ -95,6 +98,27 @@ private:
         if (cancel_.requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
     }
 
+    // Before any is taken.
+    void requireFewPoints() const {
+        constexpr double kMostPoints = double(1 << 27), kBytesPerPoint = 350.0;
+        const std::vector<double> shown = meshInstances(scene_);
+        double points = 0.0;
+        for (size_t m = 0; m < shown.size(); ++m) {
+            const Mesh& mesh = scene_.meshes[m];
+            if (!mesh.triangles.empty())
+                points += shown[m] * double(mesh.is_cloud ? mesh.positions.size() / 4
+                                                          : size_t(options_.points));
+        }
+        char text[64];
+        std::snprintf(text, sizeof text, "%.4g points to make splats of", points);
+        if (points > kMostPoints) {
+            throw Error(ErrorCode::kUnsupported, scene_.path,
+                        std::string("has ") + text + ", more than 2^27");
+        }
+        budgetBeside(scene_, options_.memory_limit_mb)
+            .require(points * kBytesPerPoint, scene_.path, text);
+    }
+
     // The points of all instances, in order.
     void gather(uint32_t group_index, const Affine& world_from_group, int depth) {
         const Group& group = scene_.groups[group_index];
@@ -126,9 +150,6 @@ private:
             for (int k = 0; k < 3; ++k)
                 point.color[k] = srgbFromLinear(std::clamp(albedo[k], 0.0f, 1.0f));
             point.finish = finishOf(material);
-            constexpr size_t kMostPoints = size_t(1) << 27;
-            if (points_.size() >= kMostPoints)
-                throw Error(ErrorCode::kUnsupported, scene_.path, "has more than 2^27 points");
             points_.push_back(point);
         };
         if (mesh.is_cloud) {

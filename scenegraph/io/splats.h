@@ -23,6 +23,7 @@ struct SplatOptions {
     bool has_cuts = true;           // lines that cut splats at creases
     bool relax = true;              // leave splats out whose points others cover
     bool naive = false;             // one splat a point, for comparison
+    uint64_t memory_limit_mb = 0;   // that building may take; 0: as LoadOptions
 };
 
 // Sets one option from text, as `stipple build --set` has it. Throws kInvalidArgument.
@@ -42,7 +43,8 @@ struct SplatReport {
 // Of all that the scene's root shows: clouds by their points (normals are kept where the file has
 // them, else estimated and turned the same way), meshes by points spread evenly over them. The same
 // model for any number of threads. progress may be called from any thread, one at a time. Throws
-// kInvalidScene if there are no points, kCancelled. O(n log n) for small tolerances.
+// kInvalidScene if there are no points, kUnsupported for more than 2^27, kOutOfMemory, kCancelled.
+// O(n log n) for small tolerances.
 SurfelModel buildSplats(const Scene& scene, const SplatOptions& options, ThreadPool& pool,
                         const CancelFlag& cancel,
                         const std::function<void(double fraction)>& progress, SplatReport& report);

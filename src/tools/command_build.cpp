@@ -60,6 +60,7 @@ struct BuildJob {
     const CancelFlag& cancel;
     std::function<void(double)> progress;
     std::string source;  // file name
+    uint64_t memory_limit_mb = 0;
 };
 
 // A kind of model: its options, and how it is made.
@@ -98,8 +99,10 @@ public:
     }
     Built build(const BuildJob& job) const override {
         PointBlockReport r;
+        auto options = options_;
+        options.memory_limit_mb = job.memory_limit_mb;
         SurfelModel model =
-            buildPointBlockModel(job.scene, options_, job.pool, job.cancel, job.progress, r);
+            buildPointBlockModel(job.scene, options, job.pool, job.cancel, job.progress, r);
         model.source = job.source;
         Built built;
         built.text = surfelFileText(model);
@@ -129,7 +132,9 @@ public:
     }
     Built build(const BuildJob& job) const override {
         SplatReport r;
-        SurfelModel model = buildSplats(job.scene, options_, job.pool, job.cancel, job.progress, r);
+        auto options = options_;
+        options.memory_limit_mb = job.memory_limit_mb;
+        SurfelModel model = buildSplats(job.scene, options, job.pool, job.cancel, job.progress, r);
         model.source = job.source;
         if (r.same_places > 0) {
             printMessage("warning: " + job.source + ": " + std::to_string(r.same_places) +
@@ -163,7 +168,9 @@ public:
     }
     Built build(const BuildJob& job) const override {
         HybridReport r;
-        HybridModel model = buildHybrid(job.scene, options_, job.pool, job.cancel, job.progress, r);
+        auto options = options_;
+        options.memory_limit_mb = job.memory_limit_mb;
+        HybridModel model = buildHybrid(job.scene, options, job.pool, job.cancel, job.progress, r);
         model.source = job.source;
         Built built;
         built.text = hybridFileText(model);
@@ -236,7 +243,7 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
         ->check(CLI::Range(0, 1024).description(""))
         ->group("Running");
     app.add_option("--memory-limit", memory_limit_mb,
-                   "most memory that loading may take, in MB (default: the machine's)")
+                   "most memory that loading and building may take, in MB (default: the machine's)")
         ->type_name("MB")
         ->group("Running");
     app.add_flag("--allow-outside", allow_outside, "let a scene's paths leave its folder")
@@ -266,9 +273,9 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
 
     Built built;
     try {
-        built = model_kind->build({scene, pool, cancel,
-                                   [&](double fraction) { progress.update("build", fraction); },
-                                   std::filesystem::path(input).filename().string()});
+        built = model_kind->build(
+            {scene, pool, cancel, [&](double fraction) { progress.update("build", fraction); },
+             std::filesystem::path(input).filename().string(), memory_limit_mb});
     } catch (const Error& error) {
         if (error.where().empty() && error.code() == ErrorCode::kInvalidArgument)
             throw Error(ErrorCode::kInvalidScene, input, error.what());

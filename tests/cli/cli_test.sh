@@ -296,6 +296,7 @@ case_path_pictures() {
 case_memory_limit() {
     "$stipple" generate terrain --count 2000000 -o terrain.glb >/dev/null || fail "cannot generate"
     expect_error 1 'terrain\.glb' info terrain.glb --memory-limit 20
+    expect_error 1 'points to make splats of' build terrain.glb --as splats --set points=100000000 --memory-limit 2000 -o t.stipple
 }
 
 case_render_png() {

@@ -193,6 +193,27 @@ TEST(Splats, smallThingsOnALargePlaneAreFew) {
     EXPECT_LE(report.splats, 300u);
 }
 
+TEST(Splats, tooManyPointsAreRefusedBeforeTheyAreTaken) {
+    TestScene scene;
+    scene.add(makePrimitive("box", 12, Vec3(0.5f)), Affine());
+    for (int i = 0; i < 999; ++i) scene.root.instances.add(ChildRef::mesh(0), Affine());
+    scene.build();
+    const auto errorOf = [&](int points, uint64_t limit_mb) {
+        SplatOptions options;
+        options.points = points;
+        options.memory_limit_mb = limit_mb;
+        SplatReport report;
+        try {
+            build(scene.scene, options, report);
+        } catch (const Error& error) {
+            return error.code();
+        }
+        return ErrorCode::kInternal;
+    };
+    EXPECT_EQ(errorOf(200000, 500), ErrorCode::kUnsupported);  // 2 * 10^8
+    EXPECT_EQ(errorOf(20000, 500), ErrorCode::kOutOfMemory);
+}
+
 TEST(Splats, whatIsThereTwiceCountsOnce) {
     TestScene once, twice;
     once.add(makePrimitive("torus", 200, Vec3(0.5f)), Affine());
