@@ -8,6 +8,7 @@
 #include <scenegraph/io/splat_choice.h>
 #include <scenegraph/io/splat_pack.h>
 #include <scenegraph/surface_at.h>
+#include <scenegraph/surfel_finish.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -61,6 +62,7 @@ public:
         middle_ = bounds.isEmpty() ? DVec3(0.0) : 0.5 * (bounds.min + bounds.max);
         requireFewPoints();
         gather(scene_.root, Affine(), 0);
+        makeFinishesOfPoints();
         report.same_places = joinSamePlaces(points_);
         if (points_.empty())
             throw Error(ErrorCode::kInvalidScene, scene_.path, "has no points to make splats of");
@@ -140,7 +142,7 @@ private:
         DMat3 area_map = cofactor(world_from_object.linear);
         const double side = glm::dot(world_from_object.linear[0], area_map[0]) < 0.0 ? -1.0 : 1.0;
         const auto add = [&](const Vec3& p, const Vec3& normal, const Vec3& albedo,
-                             uint16_t material) {
+                             uint16_t material, SurfaceFinish finish) {
             SplatPoint point;
             point.is_facing = !mesh.is_cloud;
             point.position = Vec3(world_from_object.point(DVec3(p)) - middle_);
@@ -149,7 +151,9 @@ private:
             point.normal = Vec3(glm::normalize(facing));
             for (int k = 0; k < 3; ++k)
                 point.color[k] = srgbFromLinear(std::clamp(albedo[k], 0.0f, 1.0f));
-            point.finish = finishOf(material);
+            roughness_.push_back(finish.roughness);
+            finish.roughness = 0.0f;
+            finish_key_.push_back(finishKey(scene_.materials, material, finish));
             points_.push_back(point);
         };
         if (mesh.is_cloud) {
@@ -160,7 +164,7 @@ private:
                 const Vec3 tint = mesh.colors.empty() ? Vec3(1.0f) : Vec3(mesh.colors[i]);
                 if (glm::dot(normal, normal) > 0.0f)
                     add(0.25f * (c[0] + c[1] + c[2] + c[3]), normal, material.base_color * tint,
-                        mesh.triangle_material[0]);
+                        mesh.triangle_material[0], plainFinish(material));
             }
             return;
         }
@@ -186,26 +190,27 @@ private:
             // Single-sided surfaces are seen from the side that their winding says.
             const bool is_turned = scene_.materials[mesh.triangle_material[t]].double_sided &&
                                    glm::dot(flat, surface.normal_object) < 0.0f;
-            add(p, is_turned ? -flat : flat, surface.albedo, mesh.triangle_material[t]);
+            add(p, is_turned ? -flat : flat, surface.albedo, mesh.triangle_material[t],
+                surface.finish);
         }
     }
 
-    uint8_t finishOf(uint16_t material) {
-        const auto found = finish_of_.find(material);
-        if (found != finish_of_.end()) return found->second;
-        if (finishes_.size() == 256) return 255;
-        SurfelFinish finish;
-        finish.material = Material();
-        const Material& from = scene_.materials[material];
-        finish.material.name = from.name;
-        finish.material.double_sided = from.double_sided;
-        finish.material.metallic = from.metallic;
-        finish.material.roughness = from.roughness;
-        finish.material.specular = from.specular;
-        finish.material.translucency = from.translucency;
-        finish.material.unlit = from.unlit;
-        finishes_.push_back(finish);
-        return finish_of_[material] = uint8_t(finishes_.size() - 1);
+    // One a material, but for whether its textures make it shine or metal: splats end where another
+    // begins. As rough as its points are in the mean.
+    void makeFinishesOfPoints() {
+        std::map<uint32_t, uint8_t> index_of;
+        for (const uint32_t key : finish_key_) index_of[key] = 0;
+        const std::vector<float> no_width(scene_.materials.size(), 0.0f);
+        finishes_ = makeFinishes(scene_.materials, no_width, index_of);
+        std::vector<double> roughness(finishes_.size(), 0.0), count(finishes_.size(), 0.0);
+        for (size_t i = 0; i < points_.size(); ++i) {
+            const uint8_t f = points_[i].finish = index_of.at(finish_key_[i]);
+            roughness[f] += double(roughness_[i]);
+            count[f] += 1.0;
+        }
+        for (size_t f = 0; f < finishes_.size(); ++f)
+            finishes_[f].material.roughness = float(roughness[f] / count[f]);
+        finish_key_ = {}, roughness_ = {};
     }
 
     // How far points are from the nearest of the splats that cover them.
@@ -232,7 +237,8 @@ private:
     DVec3 middle_ = DVec3(0.0);
     SplatPoints points_;  // relative to the middle
     std::vector<SurfelFinish> finishes_;
-    std::map<uint16_t, uint8_t> finish_of_;
+    std::vector<uint32_t> finish_key_;  // a point, until finishes are made; and as rough as that
+    std::vector<float> roughness_;
 };
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 #include <scenegraph/io/load.h>
 #include <scenegraph/io/splats.h>
+#include <scenegraph/surface_at.h>
+#include <scenegraph/surfel_finish.h>
 #include <tests/image/test_scene.h>
 
 #include <unistd.h>
@@ -191,6 +193,55 @@ TEST(Splats, smallThingsOnALargePlaneAreFew) {
     build(scene.build(), options, report);
     EXPECT_EQ(report.points, 100000u);
     EXPECT_LE(report.splats, 300u);
+}
+
+TEST(Splats, shineAsTheirMaterialsDo) {
+    TestScene scene;
+    scene.add(makePrimitive("sphere", 200, Vec3(0.5f)), Affine());
+    Material& material = scene.scene.materials[0];
+    material.emissive = Vec3(3, 2, 1);
+    material.specular_weight = 0.25f;
+    material.roughness = 0.3f;
+    SplatOptions options;
+    options.points = 1000;
+    SplatReport report;
+    const SurfelModel model = build(scene.build(), options, report);
+    ASSERT_EQ(model.finishes.size(), 1u);
+    EXPECT_EQ(model.finishes[0].material.emissive, Vec3(3, 2, 1));
+    EXPECT_EQ(model.finishes[0].material.specular_weight, 0.25f);
+    EXPECT_EQ(model.finishes[0].material.roughness, 0.3f);
+}
+
+// More materials than a model has finishes: alike ones share one.
+TEST(Splats, ofVeryManyMaterialsAlikeOnesAreJoined) {
+    std::vector<Material> materials(1000);
+    std::map<uint32_t, uint8_t> index_of, few;
+    for (uint32_t i = 0; i < 1000; ++i) {
+        Material& m = materials[i];
+        m.double_sided = i % 2;
+        m.unlit = i % 7 == 0;
+        m.roughness = float(i % 100) / 100.0f;
+        m.emissive = Vec3(i % 5 == 0 ? 4.0f : 0.0f);
+        index_of[finishKey(materials, i, plainFinish(m))] = 0;
+        // 200 of them, most with numbers above 255.
+        if (i >= 800) few[finishKey(materials, i, plainFinish(m))] = 0;
+    }
+    ASSERT_EQ(index_of.size(), 1000u);
+    const std::vector<float> width(1000, 1.0f);
+    const std::vector<SurfelFinish> finishes = makeFinishes(materials, width, index_of);
+    EXPECT_LE(finishes.size(), 256u);
+    EXPECT_GE(finishes.size(), 20u);
+    EXPECT_EQ(makeFinishes(materials, width, few).size(), 200u);
+    for (uint32_t i = 0; i < 1000; ++i) {
+        const uint32_t key = finishKey(materials, i, plainFinish(materials[i]));
+        const Material& m = finishes[index_of.at(key)].material;
+        EXPECT_EQ(m.double_sided, materials[i].double_sided) << i;
+        EXPECT_EQ(m.unlit, materials[i].unlit) << i;
+        EXPECT_NEAR(m.roughness, materials[i].roughness, 0.1f) << i;
+        EXPECT_EQ(m.emissive, materials[i].emissive) << i;
+        if (i < 800) continue;
+        EXPECT_EQ(few.at(key), i - 800);
+    }
 }
 
 TEST(Splats, tooManyPointsAreRefusedBeforeTheyAreTaken) {
