@@ -88,6 +88,8 @@ public:
         for (const SplatPoint& p : points_) area += areaOf(p);
         SurfelModel model = packSplats(splats, finishes_, middle_, enclosingFloatBox(bounds), area);
         report.points = points_.size();
+        report.points_on_meshes = size_t(std::count_if(
+            points_.begin(), points_.end(), [](const SplatPoint& p) { return p.is_facing; }));
         report.splats = splats.size();
         report.tolerance = double(rules.tolerance);
         measure(chosen, report);
@@ -157,14 +159,20 @@ private:
             points_.push_back(point);
         };
         if (mesh.is_cloud) {
-            for (size_t i = 0; i + 3 < mesh.positions.size(); i += 4) {
-                const Vec3* c = &mesh.positions[i];
+            // One of a disc's triangles; its corners are all alike.
+            std::vector<uint32_t> triangle_of(mesh.positions.size() / 4, kNone);
+            for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
+                triangle_of[mesh.triangles[t].x / 4] = t;
+            for (size_t i = 0; i < triangle_of.size(); ++i) {
+                const uint32_t t = triangle_of[i];
+                if (t == kNone) continue;
+                const Vec3* c = &mesh.positions[4 * i];
                 const Vec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
-                const Material& material = scene_.materials[mesh.triangle_material[0]];
-                const Vec3 tint = mesh.colors.empty() ? Vec3(1.0f) : Vec3(mesh.colors[i]);
+                const MeshSurface surface =
+                    surfaceAt(mesh, scene_.materials, scene_.textures, t, 0.3f, 0.3f, {});
                 if (glm::dot(normal, normal) > 0.0f)
-                    add(0.25f * (c[0] + c[1] + c[2] + c[3]), normal, material.base_color * tint,
-                        mesh.triangle_material[0], plainFinish(material));
+                    add(0.25f * (c[0] + c[1] + c[2] + c[3]), normal, surface.albedo,
+                        mesh.triangle_material[t], surface.finish);
             }
             return;
         }
@@ -228,6 +236,8 @@ private:
             report.mean_distance += double(d) / double(distance.size());
         }
     }
+
+    static constexpr uint32_t kNone = 0xffffffffu;
 
     const Scene& scene_;
     const SplatOptions& options_;

@@ -35,7 +35,8 @@ SplatRules rulesOf(const SplatOptions& options, double diagonal);
 struct SplatReport {
     double seconds = 0.0;
     uint64_t points = 0, splats = 0;
-    uint64_t same_places = 0;  // points left out: others lie at the very same places
+    uint64_t points_on_meshes = 0;  // of these; the others are a cloud's
+    uint64_t same_places = 0;       // points left out: others lie at the very same places
     double largest_distance = 0.0, mean_distance = 0.0;  // of points from their splat, m
     double tolerance = 0.0;                              // m
 };

@@ -78,6 +78,10 @@ std::string formatted(const char* format, Values... values) {
     return line;
 }
 
+std::string counted(uint64_t n, const char* thing) {
+    return std::to_string(n) + " " + thing + (n == 1 ? "" : "s");
+}
+
 Json surfelReport(const SurfelModel& model, size_t bytes) {
     size_t blocks = 0, surfels = 0;
     for (const SurfelLevel& level : model.levels)
@@ -108,11 +112,11 @@ public:
         built.text = surfelFileText(model);
         built.report = surfelReport(model, built.text.size());
         const size_t surfels = built.report["surfels_all_levels"];
-        built.line = formatted(
-            "%zu points in %zu blocks at the finest of %zu levels, %zu points in all; "
-            "%.1f bits a point",
-            model.levels[0].size(), model.levels[0].blocks.size(), model.levels.size(), surfels,
-            8.0 * double(built.text.size()) / double(surfels));
+        built.line = counted(model.levels[0].size(), "point") + " in " +
+                     counted(model.levels[0].blocks.size(), "block") + " at the finest of " +
+                     counted(model.levels.size(), "level") + ", " + counted(surfels, "point") +
+                     formatted(" in all; %.1f bits a point",
+                               8.0 * double(built.text.size()) / double(surfels));
         built.report.update({{"seconds", r.seconds},
                              {"rays", r.rays},
                              {"samples_hit", r.samples_hit},
@@ -137,19 +141,26 @@ public:
         SurfelModel model = buildSplats(job.scene, options, job.pool, job.cancel, job.progress, r);
         model.source = job.source;
         if (r.same_places > 0) {
-            printMessage("warning: " + job.source + ": " + std::to_string(r.same_places) +
-                         " points are left out: others lie at the very same places; the first of "
+            printMessage("warning: " + job.source + ": " + counted(r.same_places, "point") +
+                         (r.same_places == 1 ? " is" : " are") +
+                         "  left out: others lie at the very same places; the first of "
                          "each is kept");
         }
         Built built;
         built.text = surfelFileText(model);
         built.report = surfelReport(model, built.text.size());
-        built.line = formatted(
-            "%llu points, %llu splats; points lie within %.3g m of them, %.3g m on average",
-            static_cast<unsigned long long>(r.points), static_cast<unsigned long long>(r.splats),
-            r.largest_distance, r.mean_distance);
+        const std::string on_meshes =
+            r.points_on_meshes == 0 ? ""
+            : r.points_on_meshes == r.points
+                ? " on meshes"
+                : formatted(" (%llu on meshes)",
+                            static_cast<unsigned long long>(r.points_on_meshes));
+        built.line = counted(r.points, "point") + on_meshes + ", " + counted(r.splats, "splat") +
+                     formatted("; points lie within %.3g m of them, %.3g m on average",
+                               r.largest_distance, r.mean_distance);
         built.report.update({{"seconds", r.seconds},
                              {"points", r.points},
+                             {"points_on_meshes", r.points_on_meshes},
                              {"same_places", r.same_places},
                              {"tolerance", r.tolerance},
                              {"largest_distance", r.largest_distance},
@@ -174,12 +185,11 @@ public:
         model.source = job.source;
         Built built;
         built.text = hybridFileText(model);
-        built.line = formatted(
-            "%llu triangles in %u clusters (%.0f %% in flat ones), %u patches; %llu surfels, %llu "
-            "in all levels",
-            static_cast<unsigned long long>(r.triangles), r.clusters, 100.0 * r.flat_share,
-            r.patches, static_cast<unsigned long long>(r.surfels),
-            static_cast<unsigned long long>(r.surfels_all_levels));
+        built.line = counted(r.triangles, "triangle") + " in " + counted(r.clusters, "cluster") +
+                     formatted(" (%.0f %% in flat ones), ", 100.0 * r.flat_share) +
+                     (r.patches == 1 ? "1 patch" : std::to_string(r.patches) + " patches") + "; " +
+                     counted(r.surfels, "surfel") + ", " + std::to_string(r.surfels_all_levels) +
+                     " in all levels";
         built.report = {{"schema", 1},
                         {"kind", "hybrid"},
                         {"triangles", r.triangles},
