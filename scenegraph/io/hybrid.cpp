@@ -78,8 +78,7 @@ struct Patch {
 class HybridBuilder {
 public:
     HybridBuilder(Source source, const HybridOptions& options, const MemoryBudget& budget,
-                  ThreadPool& pool, const CancelFlag& cancel,
-                  const std::function<void(double)>& progress)
+                  ThreadPool& pool, const CancelFlag& cancel, const BuildProgress& progress)
         : source_(std::move(source)),
           options_(options),
           budget_(budget),
@@ -96,9 +95,10 @@ public:
 
     HybridModel build(HybridReport& report) {
         Stopwatch watch;
+        progress_("clusters", 0.0);
         clusters_ = clusterFaces(source_.mesh, options_.clusters, cancel_);
         report.cluster_seconds = watch.seconds();
-        progress_(0.3);
+        progress_("surfels", 0.0);
         listTriangles();
         makePatches();
         if (options_.paint_clusters) paint();
@@ -107,7 +107,7 @@ public:
         watch = Stopwatch();
         if (options_.keep != PatchKind::kTriangles) sample(model);
         report.sample_seconds = watch.seconds();
-        progress_(0.7);
+        progress_("triangles", 0.0);
         watch = Stopwatch();
         if (options_.keep != PatchKind::kSurfels) simplify(model);
         report.simplify_seconds = watch.seconds();
@@ -401,7 +401,7 @@ private:
     const MemoryBudget& budget_;
     ThreadPool& pool_;
     const CancelFlag& cancel_;
-    const std::function<void(double)>& progress_;
+    const BuildProgress& progress_;
     Box3 bounds_;
     double diagonal_ = 0.0;
     FaceClusters clusters_;
@@ -433,7 +433,7 @@ void requireFewTriangles(const Scene& scene, const MemoryBudget& budget) {
 }
 
 Source sourceOf(const Scene& scene, const HybridOptions& options, const MemoryBudget& budget,
-                ThreadPool& pool, const CancelFlag& cancel) {
+                ThreadPool& pool, const CancelFlag& cancel, const BuildProgress& progress) {
     Source source;
     if (!isCloud(scene)) {
         requireFewTriangles(scene, budget);
@@ -446,8 +446,7 @@ Source sourceOf(const Scene& scene, const HybridOptions& options, const MemoryBu
     SplatReport report;
     SplatOptions splat_options = options.splats;
     splat_options.memory_limit_mb = options.memory_limit_mb;
-    const SurfelModel splats = buildSplats(
-        scene, splat_options, pool, cancel, [](double) {}, report);
+    const SurfelModel splats = buildSplats(scene, splat_options, pool, cancel, progress, report);
     source.mesh = discPolygons(splats, splats.levels[0], kDiscSide);
     for (const SurfelFinish& finish : splats.finishes) {
         source.materials.push_back(finish.material);
@@ -460,13 +459,12 @@ Source sourceOf(const Scene& scene, const HybridOptions& options, const MemoryBu
 }  // namespace
 
 HybridModel buildHybrid(const Scene& scene, const HybridOptions& options, ThreadPool& pool,
-                        const CancelFlag& cancel,
-                        const std::function<void(double fraction)>& progress,
+                        const CancelFlag& cancel, const BuildProgress& progress,
                         HybridReport& report) {
     const Stopwatch watch;
     const MemoryBudget budget = budgetBeside(scene, options.memory_limit_mb);
-    HybridBuilder builder(sourceOf(scene, options, budget, pool, cancel), options, budget, pool,
-                          cancel, progress);
+    HybridBuilder builder(sourceOf(scene, options, budget, pool, cancel, progress), options, budget,
+                          pool, cancel, progress);
     HybridModel model = builder.build(report);
     report.seconds = watch.seconds();
     return model;

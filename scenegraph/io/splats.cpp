@@ -53,7 +53,7 @@ namespace {
 class SplatBuilder {
 public:
     SplatBuilder(const Scene& scene, const SplatOptions& options, ThreadPool& pool,
-                 const CancelFlag& cancel, const std::function<void(double)>& progress)
+                 const CancelFlag& cancel, const BuildProgress& progress)
         : scene_(scene), options_(options), pool_(pool), cancel_(cancel), progress_(progress) {}
 
     SurfelModel build(SplatReport& report) {
@@ -61,6 +61,7 @@ public:
         const DBox3 bounds = sceneBounds(scene_);
         middle_ = bounds.isEmpty() ? DVec3(0.0) : 0.5 * (bounds.min + bounds.max);
         requireFewPoints();
+        progress_("points", 0.0);
         gather(scene_.root, Affine(), 0);
         makeFinishesOfPoints();
         report.same_places = joinSamePlaces(points_);
@@ -72,14 +73,14 @@ public:
         for (const SplatPoint& p : points_) positions.push_back(p.position);
         PointIndex index;
         index.build(positions);
+        progress_("normals", 0.0);
         findNormals(points_, index, options_.neighbours, pool_, cancel_);
-        progress_(0.3);
+        progress_("splats", 0.0);
         const std::vector<ChosenSplat> chosen =
-            options_.naive
-                ? splatEachPoint(points_)
-                : chooseSplats(points_, index, rules, options_.relax, pool_, cancel_,
-                               [&](double fraction) { progress_(0.3 + 0.6 * fraction); });
-        progress_(0.95);
+            options_.naive ? splatEachPoint(points_)
+                           : chooseSplats(points_, index, rules, options_.relax, pool_, cancel_,
+                                          [&](double fraction) { progress_("splats", fraction); });
+        progress_("model", 0.0);
         std::vector<Splat> splats;
         for (const ChosenSplat& s : chosen) splats.push_back(s.splat);
         // One surface, whose holes may be closed.
@@ -243,7 +244,7 @@ private:
     const SplatOptions& options_;
     ThreadPool& pool_;
     const CancelFlag& cancel_;
-    const std::function<void(double)>& progress_;
+    const BuildProgress& progress_;
     DVec3 middle_ = DVec3(0.0);
     SplatPoints points_;  // relative to the middle
     std::vector<SurfelFinish> finishes_;
@@ -254,8 +255,8 @@ private:
 }  // namespace
 
 SurfelModel buildSplats(const Scene& scene, const SplatOptions& options, ThreadPool& pool,
-                        const CancelFlag& cancel,
-                        const std::function<void(double fraction)>& progress, SplatReport& report) {
+                        const CancelFlag& cancel, const BuildProgress& progress,
+                        SplatReport& report) {
     return SplatBuilder(scene, options, pool, cancel, progress).build(report);
 }
 

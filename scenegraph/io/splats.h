@@ -14,6 +14,9 @@
 
 namespace stipple {
 
+// step: one word for people; fraction: of the step, 0..1.
+using BuildProgress = std::function<void(const char* step, double fraction)>;
+
 struct SplatOptions {
     double tolerance = 0.1;         // of points from their splat, per cent of the bounds' diagonal
     double color_tolerance = 0.15;  // of points' colours from their splat's, 0..2 (sRGB, a channel)
@@ -43,11 +46,11 @@ struct SplatReport {
 
 // Of all that the scene's root shows: clouds by their points (normals are kept where the file has
 // them, else estimated and turned the same way), meshes by points spread evenly over them. The same
-// model for any number of threads. progress may be called from any thread, one at a time. Throws
-// kInvalidScene if there are no points, kUnsupported for more than 2^27, kOutOfMemory, kCancelled.
-// O(n log n) for small tolerances.
+// model for any number of threads. progress is told the step and how much of it is done; it may be
+// called from any thread, one at a time. Throws kInvalidScene if there are no points, kUnsupported
+// for more than 2^27, kOutOfMemory, kCancelled. O(n log n) for small tolerances.
 SurfelModel buildSplats(const Scene& scene, const SplatOptions& options, ThreadPool& pool,
-                        const CancelFlag& cancel,
-                        const std::function<void(double fraction)>& progress, SplatReport& report);
+                        const CancelFlag& cancel, const BuildProgress& progress,
+                        SplatReport& report);
 
 }  // namespace stipple

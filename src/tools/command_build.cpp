@@ -58,7 +58,7 @@ struct BuildJob {
     const Scene& scene;
     ThreadPool& pool;
     const CancelFlag& cancel;
-    std::function<void(double)> progress;
+    BuildProgress progress;
     std::string source;  // file name
     uint64_t memory_limit_mb = 0;
 };
@@ -105,8 +105,9 @@ public:
         PointBlockReport r;
         auto options = options_;
         options.memory_limit_mb = job.memory_limit_mb;
-        SurfelModel model =
-            buildPointBlockModel(job.scene, options, job.pool, job.cancel, job.progress, r);
+        SurfelModel model = buildPointBlockModel(
+            job.scene, options, job.pool, job.cancel,
+            [&](double fraction) { job.progress("points", fraction); }, r);
         model.source = job.source;
         Built built;
         built.text = surfelFileText(model);
@@ -284,7 +285,8 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
     Built built;
     try {
         built = model_kind->build(
-            {scene, pool, cancel, [&](double fraction) { progress.update("build", fraction); },
+            {scene, pool, cancel,
+             [&](const char* step, double fraction) { progress.update(step, fraction); },
              std::filesystem::path(input).filename().string(), memory_limit_mb});
     } catch (const Error& error) {
         if (error.where().empty() && error.code() == ErrorCode::kInvalidArgument)

@@ -1039,6 +1039,7 @@ case_build_errors() {
     write_scene
     expect_ok build scene.scene.json --as splats -o splats.stipple --set points=2000
     expect_stdout '2000 points on meshes, [0-9]+ splats'
+    for step in load points normals splats; do grep -qE "^$step: [0-9.]+ s\$" stderr.txt || fail "no line of $step"; done
     printf 'ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n1 2 3\n' >one.ply
     expect_ok build one.ply --as splats -o one.stipple
     expect_stdout ': 1 point, 1 splat; '

@@ -33,7 +33,7 @@ Scene modelOf(const Scene& source, const SplatOptions& options, ThreadPool& pool
     const std::filesystem::path path = std::filesystem::temp_directory_path() /
                                        ("stipple-splats-" + std::to_string(getpid()) + ".stipple");
     std::ofstream(path, std::ios::binary) << surfelFileText(buildSplats(
-        source, options, pool, cancel, [](double) {}, report));
+        source, options, pool, cancel, [](const char*, double) {}, report));
     Diagnostics diagnostics;
     Scene scene = loadScene(path.string(), {true, 0, nullptr}, pool, diagnostics);
     std::filesystem::remove(path);
@@ -117,7 +117,7 @@ TEST(Splats, nothingReachesBeyondABox) {
     const CancelFlag cancel;
     SplatReport report;
     const SurfelModel model = buildSplats(
-        source, optionsOf(0.1, false), pool, cancel, [](double) {}, report);
+        source, optionsOf(0.1, false), pool, cancel, [](const char*, double) {}, report);
     const SurfelLevel& level = model.levels[0];
     const float slack = float(3.0 * report.tolerance);
     std::array<Vec3, kMostDiscCorners> corners;

@@ -36,7 +36,7 @@ HybridModel build(const Scene& scene, const HybridOptions& options, int threads 
     const CancelFlag cancel;
     HybridReport report;
     return buildHybrid(
-        scene, options, pool, cancel, [](double) {}, report);
+        scene, options, pool, cancel, [](const char*, double) {}, report);
 }
 
 GeneratedMesh torus(int triangles) {

@@ -50,7 +50,7 @@ SurfelModel build(const Scene& scene, const SplatOptions& options, SplatReport& 
     ThreadPool pool(threads);
     const CancelFlag cancel;
     return buildSplats(
-        scene, options, pool, cancel, [](double) {}, report);
+        scene, options, pool, cancel, [](const char*, double) {}, report);
 }
 
 TEST(Splats, coverASphereWithinTheToleranceAndFaceOutwards) {
