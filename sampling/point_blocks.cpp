@@ -452,9 +452,12 @@ private:
 double pointBlockBytes(const PointBlockOptions& options) {
     const double pictures = double(options.directions) * kTests,
                  pixels = double(options.resolution) * options.resolution;
-    // Heights and counts; and a view's samples, of all directions.
+    // Lattices are finer where surfaces may be tilted more.
+    const double cosine = std::cos(radians(options.tolerance_angle)),
+                 cell = cosine * cosine * (options.equilateral ? std::sqrt(0.75) : 0.5);
+    // Heights and counts; and the samples of all directions.
     return pictures * pixels * (sizeof(float) + 1) +
-           double(options.directions) * pixels * sizeof(Sample);
+           double(options.directions) * 0.25 * kPi * pixels / cell * sizeof(Sample);
 }
 
 SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material>& materials,

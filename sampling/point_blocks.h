@@ -17,13 +17,14 @@ namespace stipple {
 struct PointBlockOptions {
     int resolution = 256;  // pixels along the model's bounding sphere at unit magnification
     double tolerance_angle =
-        25.0;                 // degrees: surfaces tilted less are adequately sampled by a view
-    bool equilateral = true;  // lattice of equilateral triangles; else of squares
-    int block_size = 8;       // samples along a side of what is chosen or left as a whole
-    bool scored = true;       // well-lit angles first; else whatever comes first
-    bool partial = true;      // leave single samples out that others make up for
-    bool complete = true;     // add samples where no projection has left any near enough
-    int directions = 32;      // of projections: 6 (axes), 32, or 128
+        25.0;                      // degrees: surfaces tilted less are adequately sampled by a view
+    bool equilateral = true;       // lattice of equilateral triangles; else of squares
+    int block_size = 8;            // samples along a side of what is chosen or left as a whole
+    bool scored = true;            // well-lit angles first; else whatever comes first
+    bool partial = true;           // leave single samples out that others make up for
+    bool complete = true;          // add samples where no projection has left any near enough
+    int directions = 32;           // of projections: 6 (axes), 32, or 128
+    uint64_t memory_limit_mb = 0;  // that building may take; 0: as LoadOptions
 };
 
 // Sets one option from text, as `stipple build --set` has it. Throws kInvalidArgument.
@@ -37,7 +38,8 @@ struct PointBlockReport {
     double per_pixel = 0.0;  // samples kept per pixel of the surface at unit magnification
 };
 
-// Most memory that building takes, roughly.
+// Most memory that building takes, roughly: of a model that fills its bounding sphere's disc from
+// everywhere.
 double pointBlockBytes(const PointBlockOptions& options);
 
 // caster: casts relative to `center`, the middle of `bounds` (both world space); the model is in

@@ -2,36 +2,18 @@
 #include <scenegraph/surfel_finish.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace stipple {
 
 namespace {
 
-constexpr uint32_t kMostMaterials = 256, kFinishesEach = 16;
+constexpr size_t kMostFinishes = 256;
 
-bool areManyMaterials(const std::vector<Material>& materials) {
-    return materials.size() * kFinishesEach > size_t(kMostMaterials);
-}
-
-}  // namespace
-
-uint32_t finishKey(const std::vector<Material>& materials, uint32_t material_index,
-                   const SurfaceFinish& finish) {
-    const auto level = [](float v, int n) {
-        return uint32_t(std::lround(std::clamp(v, 0.0f, 1.0f) * float(n)));
-    };
-    const uint32_t material = material_index % kMostMaterials;
-    const Material& m = materials[material_index];
-    if (areManyMaterials(materials)) return material << 8;
-    const float most = std::max({m.emissive.x, m.emissive.y, m.emissive.z, 1e-6f});
-    const float shines = std::max({finish.emissive.x, finish.emissive.y, finish.emissive.z}) / most;
-    return material << 8 | level(finish.metallic, 1) << 4 | level(finish.roughness, 3) << 1 |
-           level(shines, 1);
-}
-
+// What a key stands for; is_whole: its material, whatever textures make of it.
 SurfelFinish makeFinish(const std::vector<Material>& materials,
-                        const std::vector<float>& patch_width, uint32_t key) {
+                        const std::vector<float>& patch_width, uint32_t key, bool is_whole) {
     const Material& from = materials[key >> 8];
     SurfelFinish finish;
     Material& m = finish.material;
@@ -42,25 +24,79 @@ SurfelFinish makeFinish(const std::vector<Material>& materials,
     m.specular = from.specular;
     m.specular_weight = from.specular_weight;
     finish.patch_width = patch_width[key >> 8];
-    if (from.isTextured() && !areManyMaterials(materials)) {
+    m.metallic = from.metallic;
+    m.roughness = from.roughness;
+    m.emissive = from.emissive;
+    if (is_whole) return finish;
+    if (from.metallic_roughness_map.texture != kNoTexture) {
         m.metallic = float(key >> 4 & 1);
         m.roughness = float(key >> 1 & 3) / 3.0f;
-        m.emissive = from.emissive * float(key & 1);
-    } else {
-        m.metallic = from.metallic;
-        m.roughness = from.roughness;
-        m.emissive = from.emissive;
     }
+    if (from.emissive_map.texture != kNoTexture) m.emissive *= float(key & 1);
     return finish;
+}
+
+// What joined materials have in common: values in so many steps.
+std::array<int, 12> likeness(const Material& m, int steps) {
+    const auto step = [&](float v) {
+        return int(std::lround(std::clamp(v, 0.0f, 1.0f) * float(steps)));
+    };
+    const auto shine = [&](float v) { return step(v / (1.0f + v)); };  // of any strength
+    return {m.double_sided,       m.unlit,
+            step(m.metallic),     step(m.roughness),
+            step(m.translucency), step(m.specular_weight),
+            step(m.specular.x),   step(m.specular.y),
+            step(m.specular.z),   shine(m.emissive.x),
+            shine(m.emissive.y),  shine(m.emissive.z)};
+}
+
+std::vector<SurfelFinish> joinFinishes(const std::vector<Material>& materials,
+                                       const std::vector<float>& patch_width,
+                                       std::map<uint32_t, uint8_t>& index_of) {
+    std::map<uint32_t, size_t> class_of;  // materials that there are
+    for (const auto& [key, index] : index_of) class_of.emplace(key >> 8, class_of.size());
+    size_t n_classes = class_of.size();
+    for (int steps = 64; n_classes > kMostFinishes; steps /= 2) {
+        std::map<std::array<int, 12>, size_t> classes;
+        for (auto& [material, at] : class_of)
+            at =
+                classes.emplace(likeness(materials[material], steps), classes.size()).first->second;
+        n_classes = classes.size();
+    }
+    // The first of each stands for all.
+    std::vector<SurfelFinish> finishes(n_classes);
+    std::vector<uint8_t> is_made(n_classes, 0);
+    for (auto& [key, index] : index_of) {
+        const size_t at = class_of.at(key >> 8);
+        if (!is_made[at]) finishes[at] = makeFinish(materials, patch_width, key, true);
+        is_made[at] = 1;
+        index = uint8_t(at);
+    }
+    return finishes;
+}
+
+}  // namespace
+
+uint32_t finishKey(const std::vector<Material>& materials, uint32_t material_index,
+                   const SurfaceFinish& finish) {
+    const auto level = [](float v, int n) {
+        return uint32_t(std::lround(std::clamp(v, 0.0f, 1.0f) * float(n)));
+    };
+    const Material& m = materials[material_index];
+    const float most = std::max({m.emissive.x, m.emissive.y, m.emissive.z, 1e-6f});
+    const float shines = std::max({finish.emissive.x, finish.emissive.y, finish.emissive.z}) / most;
+    return material_index << 8 | level(finish.metallic, 1) << 4 | level(finish.roughness, 3) << 1 |
+           level(shines, 1);
 }
 
 std::vector<SurfelFinish> makeFinishes(const std::vector<Material>& materials,
                                        const std::vector<float>& patch_width,
                                        std::map<uint32_t, uint8_t>& index_of) {
+    if (index_of.size() > kMostFinishes) return joinFinishes(materials, patch_width, index_of);
     std::vector<SurfelFinish> finishes;
     for (auto& [key, index] : index_of) {
         index = uint8_t(finishes.size());
-        finishes.push_back(makeFinish(materials, patch_width, key));
+        finishes.push_back(makeFinish(materials, patch_width, key, false));
     }
     return finishes;
 }

@@ -9,16 +9,14 @@
 
 namespace stipple {
 
-// Names a finish: material, and what its textures made of it, coarsely; of very many materials
-// nothing but the material.
+// Names a finish: material, and what its textures made of it, coarsely.
 uint32_t finishKey(const std::vector<Material>& materials, uint32_t material,
                    const SurfaceFinish& finish);
 
-// What a key stands for. patch_width: by material, as materialPatchWidths().
-SurfelFinish makeFinish(const std::vector<Material>& materials,
-                        const std::vector<float>& patch_width, uint32_t key);
-
-// Makes the finishes of the keys, in their order; the map's values become their indices.
+// Makes the finishes of the keys, in their order; the map's values become their indices. Of more
+// than 256 those of one material are joined; if that is not enough, those of materials that are
+// alike, but never what is seen from one side with what is seen from both, nor lit with unlit.
+// patch_width: by material, as materialPatchWidths().
 std::vector<SurfelFinish> makeFinishes(const std::vector<Material>& materials,
                                        const std::vector<float>& patch_width,
                                        std::map<uint32_t, uint8_t>& index_of);

@@ -261,12 +261,16 @@ Mesh loadGltfMesh(const GltfDocument& document, int index, const GltfPose& pose,
     Mesh mesh;
     mesh.name = source.name.empty() ? path : source.name;
     std::vector<GltfPrimitive> primitives;
+    mesh.is_cloud = true;  // if nothing but points is in it
     for (size_t i = 0; i < source.primitives.size(); ++i) {
         document.context.throwIfCancelled();
         const std::string primitive_path = path + ".primitives[" + std::to_string(i) + "]";
         auto p = loadPrimitive(document, source.primitives[i], pose, materials, primitive_path);
-        if (p && !p->triangles.empty()) primitives.push_back(std::move(*p));
+        if (!p || p->triangles.empty()) continue;
+        mesh.is_cloud = mesh.is_cloud && source.primitives[i].mode == TINYGLTF_MODE_POINTS;
+        primitives.push_back(std::move(*p));
     }
+    mesh.is_cloud = mesh.is_cloud && !primitives.empty();
     const bool any_normals = std::any_of(primitives.begin(), primitives.end(),
                                          [](const auto& p) { return !p.normals.empty(); });
     for (GltfPrimitive& p : primitives) {

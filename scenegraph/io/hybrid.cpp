@@ -4,14 +4,17 @@
 #include <core/option_text.h>
 #include <core/rng.h>
 #include <core/stopwatch.h>
+#include <scenegraph/io/edges.h>
 #include <scenegraph/io/flatten.h>
 #include <scenegraph/io/hybrid_surfels.h>
+#include <scenegraph/io/load_context.h>
 #include <scenegraph/io/patch_triangles.h>
 #include <scenegraph/io/surfel_file.h>
 #include <scenegraph/morton.h>
 #include <scenegraph/surfel_finish.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <map>
 
 namespace stipple {
@@ -74,10 +77,11 @@ struct Patch {
 
 class HybridBuilder {
 public:
-    HybridBuilder(Source source, const HybridOptions& options, ThreadPool& pool,
-                  const CancelFlag& cancel, const std::function<void(double)>& progress)
+    HybridBuilder(Source source, const HybridOptions& options, const MemoryBudget& budget,
+                  ThreadPool& pool, const CancelFlag& cancel, const BuildProgress& progress)
         : source_(std::move(source)),
           options_(options),
+          budget_(budget),
           pool_(pool),
           cancel_(cancel),
           progress_(progress) {
@@ -91,9 +95,10 @@ public:
 
     HybridModel build(HybridReport& report) {
         Stopwatch watch;
+        progress_("clusters", 0.0);
         clusters_ = clusterFaces(source_.mesh, options_.clusters, cancel_);
         report.cluster_seconds = watch.seconds();
-        progress_(0.3);
+        progress_("surfels", 0.0);
         listTriangles();
         makePatches();
         if (options_.paint_clusters) paint();
@@ -102,7 +107,7 @@ public:
         watch = Stopwatch();
         if (options_.keep != PatchKind::kTriangles) sample(model);
         report.sample_seconds = watch.seconds();
-        progress_(0.7);
+        progress_("triangles", 0.0);
         watch = Stopwatch();
         if (options_.keep != PatchKind::kSurfels) simplify(model);
         report.simplify_seconds = watch.seconds();
@@ -254,9 +259,25 @@ private:
                                               DVec3(source_.mesh.positions[v.z]) - p)) /
                        (h * h);
         }
+        // On borders, and one more a corner.
+        for (const SharedEdge& e : sharedEdges(source_.mesh)) {
+            const uint32_t a = pieces.piece_of[e.a],
+                           b = e.b == kNoTriangle ? a : pieces.piece_of[e.b];
+            if (a == b && e.b != kNoTriangle) continue;
+            const float h =
+                std::min(pieces.spacing[pieces.patch_of[a]], pieces.spacing[pieces.patch_of[b]]);
+            samples +=
+                1.0 +
+                double(glm::length(source_.mesh.positions[e.to] - source_.mesh.positions[e.from])) /
+                    double(h);
+        }
         if (samples > kMostSamples)
             throw Error(ErrorCode::kInvalidArgument, "--set",
                         "more than 2^27 surfels: take a coarser spacing or sampling");
+        constexpr double kBytesPerSample = 240.0;
+        char text[64];
+        std::snprintf(text, sizeof text, "%.4g samples of surfaces and borders", samples);
+        budget_.require(samples * kBytesPerSample, "--set", text);
     }
 
     void sample(HybridModel& model) {
@@ -377,9 +398,10 @@ private:
 
     Source source_;
     const HybridOptions& options_;
+    const MemoryBudget& budget_;
     ThreadPool& pool_;
     const CancelFlag& cancel_;
-    const std::function<void(double)>& progress_;
+    const BuildProgress& progress_;
     Box3 bounds_;
     double diagonal_ = 0.0;
     FaceClusters clusters_;
@@ -399,10 +421,22 @@ bool isCloud(const Scene& scene) {
     return has_cloud;
 }
 
-Source sourceOf(const Scene& scene, const HybridOptions& options, ThreadPool& pool,
-                const CancelFlag& cancel) {
+void requireFewTriangles(const Scene& scene, const MemoryBudget& budget) {
+    constexpr double kBytesEach = 600.0;  // flattened, and to find clusters
+    const std::vector<double> shown = meshInstances(scene);
+    double triangles = 0.0;
+    for (size_t m = 0; m < shown.size(); ++m)
+        triangles += shown[m] * double(scene.meshes[m].triangles.size());
+    char text[64];
+    std::snprintf(text, sizeof text, "%.4g triangles of all instances", triangles);
+    budget.require(triangles * kBytesEach, scene.path, text);
+}
+
+Source sourceOf(const Scene& scene, const HybridOptions& options, const MemoryBudget& budget,
+                ThreadPool& pool, const CancelFlag& cancel, const BuildProgress& progress) {
     Source source;
     if (!isCloud(scene)) {
+        requireFewTriangles(scene, budget);
         source.mesh = flattenScene(scene, cancel);
         source.materials = scene.materials;
         source.textures = scene.textures;
@@ -410,8 +444,9 @@ Source sourceOf(const Scene& scene, const HybridOptions& options, ThreadPool& po
         return source;
     }
     SplatReport report;
-    const SurfelModel splats = buildSplats(
-        scene, options.splats, pool, cancel, [](double) {}, report);
+    SplatOptions splat_options = options.splats;
+    splat_options.memory_limit_mb = options.memory_limit_mb;
+    const SurfelModel splats = buildSplats(scene, splat_options, pool, cancel, progress, report);
     source.mesh = discPolygons(splats, splats.levels[0], kDiscSide);
     for (const SurfelFinish& finish : splats.finishes) {
         source.materials.push_back(finish.material);
@@ -424,11 +459,12 @@ Source sourceOf(const Scene& scene, const HybridOptions& options, ThreadPool& po
 }  // namespace
 
 HybridModel buildHybrid(const Scene& scene, const HybridOptions& options, ThreadPool& pool,
-                        const CancelFlag& cancel,
-                        const std::function<void(double fraction)>& progress,
+                        const CancelFlag& cancel, const BuildProgress& progress,
                         HybridReport& report) {
     const Stopwatch watch;
-    HybridBuilder builder(sourceOf(scene, options, pool, cancel), options, pool, cancel, progress);
+    const MemoryBudget budget = budgetBeside(scene, options.memory_limit_mb);
+    HybridBuilder builder(sourceOf(scene, options, budget, pool, cancel, progress), options, budget,
+                          pool, cancel, progress);
     HybridModel model = builder.build(report);
     report.seconds = watch.seconds();
     return model;

@@ -22,6 +22,7 @@ struct HybridOptions {
     PatchKind keep = PatchKind::kBoth;  // kByFlatness: flat clusters triangles, others surfels
     bool paint_clusters = false;        // each in a colour of its own, to look at them
     SplatOptions splats;                // of point clouds
+    uint64_t memory_limit_mb = 0;       // that building may take; 0: as LoadOptions
 };
 
 // Sets one option from text, as `stipple build --set` has it. Throws kInvalidArgument.
@@ -36,11 +37,11 @@ struct HybridReport {
 };
 
 // Of all that the scene's root shows: of point clouds by their splats, where there is nothing else.
-// The same model for any number of threads. progress may be called from any thread, one at a time.
-// Throws kInvalidScene if there is nothing, kInvalidArgument for more than 2^27 surfels,
-// kUnsupported, kCancelled. O(n log n).
+// The same model for any number of threads. progress, as buildSplats(), may be called from any
+// thread, one at a time. Throws kInvalidScene if there is nothing, kInvalidArgument for more than
+// 2^27 surfels, kUnsupported, kOutOfMemory, kCancelled. O(n log n).
 HybridModel buildHybrid(const Scene& scene, const HybridOptions& options, ThreadPool& pool,
-                        const CancelFlag& cancel,
-                        const std::function<void(double fraction)>& progress, HybridReport& report);
+                        const CancelFlag& cancel, const BuildProgress& progress,
+                        HybridReport& report);
 
 }  // namespace stipple

@@ -50,6 +50,12 @@ void MemoryBudget::take(double bytes, const std::string& where, const std::strin
     used_bytes_ += bytes;
 }
 
+MemoryBudget budgetBeside(const Scene& scene, uint64_t limit_mb) {
+    MemoryBudget budget(limit_mb);
+    budget.take(double(sceneSize(scene).bytes), scene.path, "the scene's meshes and groups");
+    return budget;
+}
+
 void LoadContext::warnOnce(const std::string& where, const std::string& message) {
     if (warned.insert(where + '\n' + message).second) diagnostics.warn(where, message);
 }

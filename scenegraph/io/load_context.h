@@ -29,6 +29,10 @@ private:
     bool is_given_;
 };
 
+// What building from a scene may take beside it. Throws kOutOfMemory if the scene alone is too
+// large.
+MemoryBudget budgetBeside(const Scene& scene, uint64_t limit_mb);
+
 // Estimates of what one costs once built, with the transient costs of building it.
 inline constexpr double kBytesPerInstance = 110.0;
 inline constexpr double kBytesPerTriangle = 80.0;

@@ -376,10 +376,6 @@ void addPolygons(PlyContents& contents, Mesh& mesh, const std::string& where,
 
 void addPoints(PlyContents& contents, Mesh& mesh, const std::string& where, LoadContext& context) {
     const PointDiscs discs = makePointDiscs(contents.positions, contents.normals, context, where);
-    if (discs.point.size() < contents.positions.size()) {
-        context.warnOnce(where, std::to_string(contents.positions.size() - discs.point.size()) +
-                                    " points are left out: they are not finite");
-    }
     mesh.is_cloud = true;
     mesh.positions = discs.corners;
     mesh.triangles = discs.triangles;

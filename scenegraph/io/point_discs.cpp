@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <nanoflann.hpp>
 
 namespace stipple {
@@ -14,7 +15,7 @@ namespace {
 
 constexpr size_t kRadiusNeighbours = 6, kNormalNeighbours = 12;
 constexpr size_t kChunk = 4096;
-constexpr double kBytesPerPoint = 4.0 * kBytesPerVertex + 2.0 * kBytesPerTriangle + 60.0;
+constexpr double kBytesPerPoint = 4.0 * kBytesPerVertex + 2.0 * kBytesPerTriangle + 76.0;
 
 struct Cloud {
     std::vector<Vec3> points;  // relative to the first, in units of about the cloud's size
@@ -56,6 +57,61 @@ bool isNull(const Vec3& v) {
     return !(length > 1e-20f && length < 1e20f);
 }
 
+// Points to be found by their place.
+class PlaceTable {
+public:
+    explicit PlaceTable(const std::vector<Vec3>& positions)
+        : positions_(positions), slots_(std::bit_ceil(2 * positions.size() + 1), kFree) {}
+
+    // False if another has been added that lies at the very same place.
+    bool add(uint32_t point) {
+        const Vec3 p = positions_[point] + 0.0f;  // no -0
+        const auto bits = [](float v) { return uint64_t(std::bit_cast<uint32_t>(v)); };
+        const size_t mask = slots_.size() - 1;
+        size_t slot = hashCombine(bits(p.x), bits(p.y) << 32 | bits(p.z)) & mask;
+        for (; slots_[slot] != kFree; slot = (slot + 1) & mask) {
+            if (positions_[slots_[slot]] == p) return false;
+        }
+        slots_[slot] = point;
+        return true;
+    }
+
+private:
+    static constexpr uint32_t kFree = 0xffffffffu;
+    const std::vector<Vec3>& positions_;
+    std::vector<uint32_t> slots_;
+};
+
+// Those to make discs of, in order.
+std::vector<uint32_t> pointsToShow(const std::vector<Vec3>& positions, LoadContext& context,
+                                   const std::string& where) {
+    std::vector<uint32_t> points;
+    PlaceTable table(positions);
+    size_t n_lost = 0, n_same = 0;
+    for (size_t i = 0; i < positions.size(); ++i) {
+        constexpr double kMostCoordinate = 1e15;  // areas stay finite
+        const DVec3 p(positions[i]);
+        if (!isFinite(p) ||
+            std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kMostCoordinate) {
+            ++n_lost;
+        } else if (!table.add(uint32_t(i))) {
+            ++n_same;
+        } else {
+            points.push_back(uint32_t(i));
+        }
+    }
+    if (n_lost > 0) {
+        context.warnOnce(where,
+                         std::to_string(n_lost) + " points are left out: they are not finite");
+    }
+    if (n_same > 0) {
+        context.warnOnce(where, std::to_string(n_same) +
+                                    " points are left out: others lie at the very same places; the "
+                                    "first of each is kept");
+    }
+    return points;
+}
+
 }  // namespace
 
 PointDiscs makePointDiscs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals,
@@ -65,16 +121,9 @@ PointDiscs makePointDiscs(const std::vector<Vec3>& positions, const std::vector<
                         std::to_string(positions.size()) + " points");
     if (positions.size() >= size_t(1) << 30)
         throw Error(ErrorCode::kUnsupported, where, "more than 2^30 points");
+    discs.point = pointsToShow(positions, context, where);
     DBox3 bounds;
-    for (size_t i = 0; i < positions.size(); ++i) {
-        constexpr double kMostCoordinate = 1e15;  // areas stay finite
-        const DVec3 p(positions[i]);
-        if (!isFinite(p) ||
-            std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > kMostCoordinate)
-            continue;
-        discs.point.push_back(uint32_t(i));
-        bounds.extend(p);
-    }
+    for (const uint32_t i : discs.point) bounds.extend(DVec3(positions[i]));
     const size_t n = discs.point.size();
     if (n == 0) return discs;
 

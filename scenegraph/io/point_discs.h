@@ -21,7 +21,8 @@ struct PointDiscs {
 // Discs that face `normals` (as many as positions; null vectors and empty: estimated from the 12
 // nearest neighbours) and have the area of a circle whose radius is the mean distance to the six
 // nearest neighbours, but at most 4 x and at least 1/10 of the median. Points that are not finite
-// are left out. Throws kOutOfMemory, kCancelled. Deterministic for any thread count. O(n log n).
+// are left out, and of those at the very same place all but the first; warnings say how many.
+// Throws kOutOfMemory, kCancelled. Deterministic for any thread count. O(n log n).
 PointDiscs makePointDiscs(const std::vector<Vec3>& positions, const std::vector<Vec3>& normals,
                           LoadContext& context, const std::string& where);
 

@@ -163,22 +163,27 @@ void PointIndex::nearestBelow(uint32_t node, const Vec3& p, size_t k,
 
 void PointIndex::within(const Vec3& p, float radius, std::vector<NearPoint>& out) const {
     out.clear();
-    if (!nodes_.empty()) withinBelow(0, p, radius * radius, out);
+    forEachWithin(p, radius, [&](const Item& item) {
+        out.push_back({squaredLength(item.position - p), item.index});
+    });
 }
 
-void PointIndex::withinBelow(uint32_t node, const Vec3& p, float squared,
-                             std::vector<NearPoint>& out) const {
+size_t PointIndex::countWithin(const Vec3& p, float radius, size_t most) const {
+    return nodes_.empty() ? 0 : countBelow(0, p, radius * radius, most);
+}
+
+size_t PointIndex::countBelow(uint32_t node, const Vec3& p, float squared, size_t most) const {
     const Node& at = nodes_[node];
-    if (at.count == 0 || squaredDistance(at.bounds, p) > squared) return;
-    if (at.axis >= 0) {
-        withinBelow(at.left, p, squared, out);
-        withinBelow(at.right, p, squared, out);
-        return;
+    if (at.count == 0 || squaredDistance(at.bounds, p) > squared) return 0;
+    const Vec3 farthest = glm::max(p - at.bounds.min, at.bounds.max - p);
+    if (squaredLength(farthest) <= squared) return at.count;
+    if (at.axis < 0) {
+        return size_t(std::count_if(at.items.begin(), at.items.end(), [&](const Item& item) {
+            return squaredLength(item.position - p) <= squared;
+        }));
     }
-    for (const Item& item : at.items) {
-        const float d = squaredLength(item.position - p);
-        if (d <= squared) out.push_back({d, item.index});
-    }
+    const size_t left = countBelow(at.left, p, squared, most);
+    return left > most ? left : left + countBelow(at.right, p, squared, most - left);
 }
 
 }  // namespace stipple

@@ -33,14 +33,22 @@ public:
 
     // The k nearest, nearest first; of equally far ones those of lower index.
     void nearest(const Vec3& position, size_t k, std::vector<NearPoint>& out) const;
-    // All up to that distance, in an order that depends on how the index came about.
-    void within(const Vec3& position, float radius, std::vector<NearPoint>& out) const;
-
-private:
     struct Item {
         Vec3 position;
         uint32_t index;
     };
+    // All up to that distance, in an order that depends on how the index came about.
+    void within(const Vec3& position, float radius, std::vector<NearPoint>& out) const;
+    // The same, each told to visit(const Item&).
+    template <class Visit>
+    void forEachWithin(const Vec3& position, float radius, const Visit& visit) const {
+        if (!nodes_.empty()) visitBelow(0, position, radius * radius, visit);
+    }
+    // How many there are up to that distance; as soon as these are more than `most`, some number
+    // above it.
+    size_t countWithin(const Vec3& position, float radius, size_t most) const;
+
+private:
     struct Node {
         Box3 bounds;
         int axis = -1;  // -1: a leaf
@@ -54,11 +62,28 @@ private:
     void fill(uint32_t node, std::vector<Item>&& items);
     void takeAll(uint32_t node, std::vector<Item>& items);
     void nearestBelow(uint32_t node, const Vec3& p, size_t k, std::vector<NearPoint>& heap) const;
-    void withinBelow(uint32_t node, const Vec3& p, float squared,
-                     std::vector<NearPoint>& out) const;
+    size_t countBelow(uint32_t node, const Vec3& p, float squared, size_t most) const;
+    template <class Visit>
+    void visitBelow(uint32_t node, const Vec3& p, float squared, const Visit& visit) const;
 
     std::vector<Node> nodes_;  // the first is the root
     std::vector<uint32_t> unused_;
 };
+
+template <class Visit>
+void PointIndex::visitBelow(uint32_t node, const Vec3& p, float squared, const Visit& visit) const {
+    const Node& at = nodes_[node];
+    const Vec3 away = glm::max(glm::max(at.bounds.min - p, p - at.bounds.max), Vec3(0.0f));
+    if (at.count == 0 || glm::dot(away, away) > squared) return;
+    if (at.axis >= 0) {
+        visitBelow(at.left, p, squared, visit);
+        visitBelow(at.right, p, squared, visit);
+        return;
+    }
+    for (const Item& item : at.items) {
+        const Vec3 d = item.position - p;
+        if (glm::dot(d, d) <= squared) visit(item);
+    }
+}
 
 }  // namespace stipple

@@ -44,11 +44,10 @@ std::vector<ChosenSplat> growCandidates(const SplatPoints& points, const PointIn
         constexpr size_t kChunk = 16;
         pool.forEach((seeds.size() + kChunk - 1) / kChunk, [&](size_t chunk, int) {
             SplatGrower grower(points, index, rules);
-            std::vector<NearPoint> near;
             for (size_t k = chunk * kChunk; k < std::min(seeds.size(), (chunk + 1) * kChunk); ++k) {
                 ChosenSplat& candidate = candidates[first + k];
                 candidate.splat = grower.grow(seeds[k], kMostCovered);
-                findCovered(candidate.splat, points, index, rules, near, candidate.covered);
+                findCovered(candidate.splat, points, index, rules, candidate.covered);
                 // Its own point, whatever rounding makes of it.
                 std::erase(candidate.covered, seeds[k]);
                 candidate.covered.insert(candidate.covered.begin(), seeds[k]);
@@ -122,13 +121,13 @@ void leaveOutCovered(std::vector<ChosenSplat>& splats, size_t n_points) {
 }  // namespace
 
 void findCovered(const Splat& splat, const SplatPoints& points, const PointIndex& index,
-                 const SplatRules& rules, std::vector<NearPoint>& near,
-                 std::vector<uint32_t>& covered) {
-    index.within(splat.center, splat.reach(rules.tolerance), near);
+                 const SplatRules& rules, std::vector<uint32_t>& covered) {
     covered.clear();
-    for (const NearPoint& p : near) {
-        if (covers(splat, points[p.index], rules)) covered.push_back(p.index);
-    }
+    index.forEachWithin(splat.center, splat.reach(rules.tolerance),
+                        [&](const PointIndex::Item& item) {
+                            if (covers(splat, points[item.index], rules))
+                                covered.push_back(item.index);
+                        });
 }
 
 std::vector<ChosenSplat> chooseSplats(const SplatPoints& points, const PointIndex& index,

@@ -14,8 +14,7 @@ inline constexpr size_t kMostCovered = 1024;  // points, about: flat places woul
 
 // The points that a splat covers.
 void findCovered(const Splat& splat, const SplatPoints& points, const PointIndex& index,
-                 const SplatRules& rules, std::vector<NearPoint>& near,
-                 std::vector<uint32_t>& covered);
+                 const SplatRules& rules, std::vector<uint32_t>& covered);
 
 struct ChosenSplat {
     Splat splat;

@@ -212,7 +212,7 @@ void SplatCloud::coverUncovered() {
         for (size_t c = 0; c < n_tried; ++c) {
             const uint32_t seed = uncovered_[(2 * c + 1) * n / (2 * n_tried)];
             const Splat splat = grower.grow(seed, std::clamp(2 * n, kFewest, kMostCovered));
-            findCovered(splat, points_, index_, rules_, near_, covered);
+            findCovered(splat, points_, index_, rules_, covered);
             if (std::find(covered.begin(), covered.end(), seed) == covered.end())
                 covered.push_back(seed);
             size_t gain = 0;
@@ -247,7 +247,7 @@ SurfelModel SplatCloud::model() const {
     for (const Placed& placed : splats_) {
         if (placed.n_points == 0) continue;
         splats.push_back(placed.splat);
-        findCovered(placed.splat, points_, index_, rules_, near, covered);
+        findCovered(placed.splat, points_, index_, rules_, covered);
         bendNormals(points_, covered, splats.back());
         if (rules_.has_cuts) cutAtBorders(points_, index_, near, splats.back());
     }

@@ -10,10 +10,13 @@ namespace stipple {
 namespace {
 
 constexpr float kFacing = 0.2f;  // cosine: what is turned more lies on another side
+constexpr float kBack = -0.7f;   // what is turned more lies behind
 // Thinner ellipses would stand for what noise there is, and need more triangles than they save.
 constexpr float kThinnest = 0.25f;
 // No place of a surface is farther from a point than about this many spacings.
 constexpr float kGap = 1.0f;
+// Of a ball that was looked at, all is known that lies so near its middle.
+constexpr float kLeastKnown = 0.9f;
 
 bool looksLike(const SplatPoint& a, const Vec3& color, uint8_t finish, const SplatRules& rules) {
     const Vec3 d = glm::abs(a.color - color);
@@ -106,16 +109,36 @@ bool SplatGrower::cut(Grown& grown, uint32_t point, const Around& p) const {
     return true;
 }
 
-// The points up to that distance, in order of the ellipse on which they lie.
-void SplatGrower::lookAround(const Vec3& center, const Frame& frame, float reach) {
-    index_.within(center, reach, near_);
+// The points up to that distance, of those the wanted ones on ellipses up to a measure; returns how
+// many there are up to the distance. They are sorted as far as they are looked at: sortNext().
+template <class IsWanted>
+size_t SplatGrower::lookAround(const Vec3& center, const Frame& frame, float reach,
+                               float most_measure, const IsWanted& isWanted) {
     order_.clear();
-    for (const NearPoint& n : near_) {
-        const Vec3 d = points_[n.index].position - frame.origin;
+    n_sorted_ = 0;
+    size_t n = 0;
+    index_.forEachWithin(center, reach, [&](const PointIndex::Item& item) {
+        ++n;
+        const Vec3 d = item.position - frame.origin;
         const float a = glm::dot(d, frame.along), b = glm::dot(d, frame.across);
-        order_.push_back({frame.measure(a, b), n.index, a, b, glm::dot(d, frame.normal)});
-    }
-    std::sort(order_.begin(), order_.end());
+        const float measure = frame.measure(a, b);
+        if (measure <= most_measure && isWanted(item.index))
+            order_.push_back({measure, item.index, a, b, glm::dot(d, frame.normal)});
+    });
+    return n;
+}
+
+// Whether there is a point after so many; it is in its place then.
+bool SplatGrower::sortNext(size_t done) {
+    if (done < n_sorted_) return true;
+    if (done == order_.size()) return false;
+    const auto begin = order_.begin() + std::ptrdiff_t(n_sorted_);
+    // As many as there were: most growths end soon.
+    n_sorted_ = std::min(order_.size(), n_sorted_ + std::max<size_t>(64, n_sorted_));
+    const auto end = order_.begin() + std::ptrdiff_t(n_sorted_);
+    if (end != order_.end()) std::nth_element(begin, end, order_.end());
+    std::sort(begin, end);
+    return true;
 }
 
 // What is drawn reaches beyond what is covered; creases cut it there, too.
@@ -123,13 +146,24 @@ void SplatGrower::cutRim(Grown& grown, uint32_t seed) {
     constexpr float kDrawn = 1.2f;
     const SplatPoint& center = points_[seed];
     const float reach = kDrawn * grown.radius + 2.0f * center.spacing;
-    lookAround(center.position, grown.frame, reach / std::sqrt(grown.frame.ratio));
+    lookAround(center.position, grown.frame, reach / std::sqrt(grown.frame.ratio), reach,
+               [&](uint32_t i) {
+                   return points_[i].is_at_crease &&
+                          glm::dot(points_[i].normal, grown.frame.normal) < kFacing;
+               });
+    std::sort(order_.begin(), order_.end());
     for (const Around& p : order_) {
-        if (p.measure > reach) break;
-        if (points_[p.index].is_at_crease && !isBeyondCut(grown, p) &&
-            glm::dot(points_[p.index].normal, grown.frame.normal) < kFacing)
-            cut(grown, seed, p);
+        if (!isBeyondCut(grown, p)) cut(grown, seed, p);
     }
+}
+
+// Not so far that very many points lie there, as where something fine stands on something coarse.
+float SplatGrower::reachOf(const Vec3& center, float reach) const {
+    constexpr size_t kMostAround = 32768;
+    constexpr float kLess = 0.85f;
+    while (reach > 1e-15f && index_.countWithin(center, reach, kMostAround) > kMostAround)
+        reach *= kLess;
+    return reach;
 }
 
 // Over the points around, in order of the ellipse on which they lie, until one does not fit.
@@ -137,26 +171,39 @@ SplatGrower::Grown SplatGrower::growIn(uint32_t seed, const Frame& frame, float 
                                        size_t most) {
     const SplatPoint& center = points_[seed];
     const float long_share = 1.0f / std::sqrt(frame.ratio);
-    for (float known = std::max(first_reach, 1e-15f);; known *= 1.7f) {
-        lookAround(center.position, frame, known);
-        const bool are_all = near_.size() == index_.size();
+    const size_t n = index_.size();
+    for (float wanted = std::max(first_reach, 1e-15f);; wanted *= 1.7f) {
+        const float known = reachOf(center.position, wanted);
+        const bool are_all = index_.countWithin(center.position, known, n) == n;
+        // Beyond what was looked at, nothing is known; beyond all, nothing is.
+        const float most_reach =
+            are_all ? kInfinity : std::max(known - 2.0f * rules_.tolerance, kLeastKnown * known);
+        const size_t n_around = lookAround(center.position, frame, known, most_reach / long_share,
+                                           [](uint32_t) { return true; });
         Grown grown;
         grown.frame = frame;
-        for (const Around& p : order_) {
-            // Beyond what was looked at, nothing is known.
-            if (!are_all && p.measure * long_share > known - 2.0f * rules_.tolerance) break;
+        float tolerance = rules_.tolerance;
+        for (size_t k = 0; sortNext(k); ++k) {
+            const Around& p = order_[k];
             if (isBeyondCut(grown, p)) continue;
             const SplatPoint& point = points_[p.index];
             const float low = std::min(grown.lowest, p.height),
                         high = std::max(grown.highest, p.height);
             const float facing = glm::dot(point.normal, frame.normal);
-            if (high - low > 2.0f * rules_.tolerance || facing < kFacing ||
+            if (high - low > 2.0f * tolerance || facing < kFacing ||
                 !looksLike(point, center.color, center.finish, rules_)) {
                 // Another side of what this lies on, away from here.
-                if (facing < kFacing &&
-                    std::abs(p.height) > 2.0f * (center.spacing + rules_.tolerance))
-                    continue;
+                const float off = 0.5f * std::abs(p.height) - center.spacing;
+                if (facing < kFacing && off > tolerance) continue;
                 if (cut(grown, seed, p)) continue;
+                // The back of a sheet that is as thin as that.
+                if (facing < kBack && point.is_facing) continue;
+                // A large tolerance is no hindrance where less would do to tell sides apart.
+                if (facing < kFacing && off > center.spacing &&
+                    grown.highest - grown.lowest <= 2.0f * off) {
+                    tolerance = off;
+                    continue;
+                }
                 grown.is_ended = true;
                 break;
             }
@@ -165,7 +212,7 @@ SplatGrower::Grown SplatGrower::growIn(uint32_t seed, const Frame& frame, float 
             ++grown.n_points;
         }
         grown.is_ended = grown.is_ended || are_all;
-        if (grown.is_ended || near_.size() >= most) return grown;
+        if (grown.is_ended || n_around >= most || known < wanted) return grown;
     }
 }
 

@@ -94,14 +94,18 @@ private:
     bool isBeyondCut(const Grown& grown, const Around& p) const;
     bool cut(Grown& grown, uint32_t point, const Around& p) const;
     void cutRim(Grown& grown, uint32_t point);
-    void lookAround(const Vec3& center, const Frame& frame, float reach);
+    template <class IsWanted>
+    size_t lookAround(const Vec3& center, const Frame& frame, float reach, float most_measure,
+                      const IsWanted& isWanted);
+    bool sortNext(size_t done);
+    float reachOf(const Vec3& center, float reach) const;
     bool fitQuadric(uint32_t point, const Grown& circle, Frame& frame) const;
 
     const SplatPoints& points_;
     const PointIndex& index_;
     const SplatRules rules_;
-    std::vector<NearPoint> near_;
     std::vector<Around> order_;  // of the last growth
+    size_t n_sorted_ = 0;        // so many of them are in order, and before all others
 };
 
 }  // namespace stipple

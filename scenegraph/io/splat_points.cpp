@@ -6,8 +6,41 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <queue>
+#include <tuple>
 
 namespace stipple {
+
+size_t joinSamePlaces(SplatPoints& points) {
+    constexpr size_t kMostAtOnePlace = 8;
+    constexpr float kAlike = 0.9f;  // cosine
+    std::vector<uint32_t> order(points.size());
+    for (uint32_t i = 0; i < points.size(); ++i) order[i] = i;
+    std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
+        const Vec3 &p = points[a].position, &q = points[b].position;
+        return std::tie(p.x, p.y, p.z, a) < std::tie(q.x, q.y, q.z, b);
+    });
+    std::vector<uint8_t> goes(points.size(), 0);
+    std::vector<uint32_t> kept;  // at the place
+    for (const uint32_t i : order) {
+        const SplatPoint& point = points[i];
+        if (!kept.empty() && points[kept[0]].position != point.position) kept.clear();
+        goes[i] = kept.size() == kMostAtOnePlace ||
+                  std::any_of(kept.begin(), kept.end(), [&](uint32_t k) {
+                      const SplatPoint& other = points[k];
+                      return other.finish == point.finish &&
+                             (other.normal == point.normal ||
+                              glm::dot(other.normal, point.normal) > kAlike);
+                  });
+        if (!goes[i]) kept.push_back(i);
+    }
+    size_t to = 0;
+    for (size_t i = 0; i < points.size(); ++i) {
+        if (!goes[i]) points[to++] = points[i];
+    }
+    const size_t n_gone = points.size() - to;
+    points.resize(to);
+    return n_gone;
+}
 
 void fitPlane(SplatPoints& points, const PointIndex& index, int neighbours, uint32_t i,
               std::vector<NearPoint>& near) {
@@ -35,7 +68,8 @@ void fitPlane(SplatPoints& points, const PointIndex& index, int neighbours, uint
     if (!(l[1] > 0.02) || l[0] > 0.25 * l[1] || !(v.norm() > 0.5)) return;
     point.roughness = float(std::max(l[0], 0.0));
     const Vec3 plane(float(v.x()), float(v.y()), float(v.z()));
-    point.normal = glm::dot(plane, point.normal) < 0.0f ? -plane : plane;
+    // The plane of two sheets that lie close, or of an edge, is none of a surface's.
+    if (!point.is_facing) point.normal = glm::dot(plane, point.normal) < 0.0f ? -plane : plane;
 }
 
 Vec3 normalBesideCrease(const SplatPoints& points, const PointIndex& index, int neighbours,
@@ -116,6 +150,8 @@ struct TurnEdge {
 void orient(SplatPoints& points, const PointIndex& index, ThreadPool& pool,
             const CancelFlag& cancel) {
     const size_t n = points.size();
+    if (std::all_of(points.begin(), points.end(), [](const SplatPoint& p) { return p.is_facing; }))
+        return;
     const Neighbourhood around = makeNeighbourhood(points, index, pool, cancel);
     std::vector<uint32_t> by_height(n);
     for (uint32_t i = 0; i < n; ++i) by_height[i] = i;
@@ -124,6 +160,7 @@ void orient(SplatPoints& points, const PointIndex& index, ThreadPool& pool,
         return ya != yb ? ya > yb : a < b;
     });
     std::vector<uint8_t> is_done(n, 0), is_flipped(n, 0);
+    for (size_t i = 0; i < n; ++i) is_done[i] = points[i].is_facing;
     for (const uint32_t seed : by_height) {
         if (is_done[seed]) continue;
         if (cancel.requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
@@ -180,7 +217,7 @@ void findNormals(SplatPoints& points, const PointIndex& index, int neighbours, T
     });
     for (size_t i = 0; i < n; ++i) {
         points[i].is_at_crease = beside[i] != Vec3(0.0f);
-        if (points[i].is_at_crease) points[i].normal = beside[i];
+        if (points[i].is_at_crease && !points[i].is_facing) points[i].normal = beside[i];
     }
 }
 

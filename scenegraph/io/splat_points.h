@@ -18,12 +18,18 @@ struct SplatPoint {
     float roughness = 0.0f;  // of the neighbourhood: how little it is a plane, 0..1/3
     uint8_t finish = 0;
     bool is_at_crease = false;  // its plane is that of one side
+    bool is_facing = false;     // its normal is that of a surface, and stays
 };
 
 using SplatPoints = std::vector<SplatPoint>;
 
+// Of points at the very same place that face alike and have one finish, the first stays; so do the
+// first few that do not. Returns how many go. O(n log n).
+size_t joinSamePlaces(SplatPoints& points);
+
 // Fits a plane to the `neighbours` nearest points of point i: spacing, roughness and, where the
-// neighbours have a plane, the normal, on the side of the normal there was. `near`: scratch.
+// neighbours have a plane, the normal (unless it is facing), on the side of the normal there was.
+// `near`: scratch.
 void fitPlane(SplatPoints& points, const PointIndex& index, int neighbours, uint32_t i,
               std::vector<NearPoint>& near);
 
@@ -34,8 +40,8 @@ Vec3 normalBesideCrease(const SplatPoints& points, const PointIndex& index, int 
 
 // All of the above for all points. Where given normals do not agree with each other, they are
 // turned so that neighbours do, from the top of each part down (Hoppe et al. Surface Reconstruction
-// from Unorganized Points. 1992). The same for any number of threads. Throws kCancelled.
-// O(n log n).
+// from Unorganized Points. 1992). Those of points that are facing stay as they are. The same for
+// any number of threads. Throws kCancelled. O(n log n).
 void findNormals(SplatPoints& points, const PointIndex& index, int neighbours, ThreadPool& pool,
                  const CancelFlag& cancel);
 

@@ -4,13 +4,16 @@
 #include <core/image.h>
 #include <core/option_text.h>
 #include <core/stopwatch.h>
+#include <scenegraph/io/load_context.h>
 #include <scenegraph/io/splat_bend.h>
 #include <scenegraph/io/splat_border.h>
 #include <scenegraph/io/splat_choice.h>
 #include <scenegraph/io/splat_pack.h>
 #include <scenegraph/surface_at.h>
+#include <scenegraph/surfel_finish.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <map>
 
 namespace stipple {
@@ -52,14 +55,18 @@ namespace {
 class SplatBuilder {
 public:
     SplatBuilder(const Scene& scene, const SplatOptions& options, ThreadPool& pool,
-                 const CancelFlag& cancel, const std::function<void(double)>& progress)
+                 const CancelFlag& cancel, const BuildProgress& progress)
         : scene_(scene), options_(options), pool_(pool), cancel_(cancel), progress_(progress) {}
 
     SurfelModel build(SplatReport& report) {
         const Stopwatch watch;
         const DBox3 bounds = sceneBounds(scene_);
         middle_ = bounds.isEmpty() ? DVec3(0.0) : 0.5 * (bounds.min + bounds.max);
+        requireFewPoints();
+        progress_("points", 0.0);
         gather(scene_.root, Affine(), 0);
+        makeFinishesOfPoints();
+        report.same_places = joinSamePlaces(points_);
         if (points_.empty())
             throw Error(ErrorCode::kInvalidScene, scene_.path, "has no points to make splats of");
         const double diagonal = glm::length(bounds.max - bounds.min);
@@ -68,14 +75,14 @@ public:
         for (const SplatPoint& p : points_) positions.push_back(p.position);
         PointIndex index;
         index.build(positions);
+        progress_("normals", 0.0);
         findNormals(points_, index, options_.neighbours, pool_, cancel_);
-        progress_(0.3);
+        progress_("splats", 0.0);
         const std::vector<ChosenSplat> chosen =
-            options_.naive
-                ? splatEachPoint(points_)
-                : chooseSplats(points_, index, rules, options_.relax, pool_, cancel_,
-                               [&](double fraction) { progress_(0.3 + 0.6 * fraction); });
-        progress_(0.95);
+            options_.naive ? splatEachPoint(points_)
+                           : chooseSplats(points_, index, rules, options_.relax, pool_, cancel_,
+                                          [&](double fraction) { progress_("splats", fraction); });
+        progress_("model", 0.0);
         std::vector<Splat> splats;
         for (const ChosenSplat& s : chosen) splats.push_back(s.splat);
         if (!options_.naive) {
@@ -97,6 +104,8 @@ public:
         SurfelModel model =
             packSplats(splats, finishes_, middle_, enclosingFloatBox(bounds), area, &kept);
         report.points = points_.size();
+        report.points_on_meshes = size_t(std::count_if(
+            points_.begin(), points_.end(), [](const SplatPoint& p) { return p.is_facing; }));
         report.splats = splats.size();
         report.tolerance = double(rules.tolerance);
         measure(chosen, kept, report);
@@ -107,6 +116,27 @@ public:
 private:
     void throwIfAsked() const {
         if (cancel_.requested) throw Error(ErrorCode::kCancelled, "", "cancelled");
+    }
+
+    // Before any is taken.
+    void requireFewPoints() const {
+        constexpr double kMostPoints = double(1 << 27), kBytesPerPoint = 350.0;
+        const std::vector<double> shown = meshInstances(scene_);
+        double points = 0.0;
+        for (size_t m = 0; m < shown.size(); ++m) {
+            const Mesh& mesh = scene_.meshes[m];
+            if (!mesh.triangles.empty())
+                points += shown[m] * double(mesh.is_cloud ? mesh.positions.size() / 4
+                                                          : size_t(options_.points));
+        }
+        char text[64];
+        std::snprintf(text, sizeof text, "%.4g points to make splats of", points);
+        if (points > kMostPoints) {
+            throw Error(ErrorCode::kUnsupported, scene_.path,
+                        std::string("has ") + text + ", more than 2^27");
+        }
+        budgetBeside(scene_, options_.memory_limit_mb)
+            .require(points * kBytesPerPoint, scene_.path, text);
     }
 
     // The points of all instances, in order.
@@ -130,27 +160,35 @@ private:
         DMat3 area_map = cofactor(world_from_object.linear);
         const double side = glm::dot(world_from_object.linear[0], area_map[0]) < 0.0 ? -1.0 : 1.0;
         const auto add = [&](const Vec3& p, const Vec3& normal, const Vec3& albedo,
-                             uint16_t material) {
+                             uint16_t material, SurfaceFinish finish) {
             SplatPoint point;
+            point.is_facing = !mesh.is_cloud;
             point.position = Vec3(world_from_object.point(DVec3(p)) - middle_);
-            point.normal = Vec3(glm::normalize(area_map * DVec3(normal) * side));
+            const DVec3 facing = area_map * DVec3(normal) * side;
+            if (!(glm::length(facing) > 0.0)) return;  // of no area in the world
+            point.normal = Vec3(glm::normalize(facing));
             for (int k = 0; k < 3; ++k)
                 point.color[k] = srgbFromLinear(std::clamp(albedo[k], 0.0f, 1.0f));
-            point.finish = finishOf(material);
-            constexpr size_t kMostPoints = size_t(1) << 27;
-            if (points_.size() >= kMostPoints)
-                throw Error(ErrorCode::kUnsupported, scene_.path, "has more than 2^27 points");
+            roughness_.push_back(finish.roughness);
+            finish.roughness = 0.0f;
+            finish_key_.push_back(finishKey(scene_.materials, material, finish));
             points_.push_back(point);
         };
         if (mesh.is_cloud) {
-            for (size_t i = 0; i + 3 < mesh.positions.size(); i += 4) {
-                const Vec3* c = &mesh.positions[i];
+            // One of a disc's triangles; its corners are all alike.
+            std::vector<uint32_t> triangle_of(mesh.positions.size() / 4, kNone);
+            for (uint32_t t = 0; t < mesh.triangles.size(); ++t)
+                triangle_of[mesh.triangles[t].x / 4] = t;
+            for (size_t i = 0; i < triangle_of.size(); ++i) {
+                const uint32_t t = triangle_of[i];
+                if (t == kNone) continue;
+                const Vec3* c = &mesh.positions[4 * i];
                 const Vec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
-                const Material& material = scene_.materials[mesh.triangle_material[0]];
-                const Vec3 tint = mesh.colors.empty() ? Vec3(1.0f) : Vec3(mesh.colors[i]);
+                const MeshSurface surface =
+                    surfaceAt(mesh, scene_.materials, scene_.textures, t, 0.3f, 0.3f, {});
                 if (glm::dot(normal, normal) > 0.0f)
-                    add(0.25f * (c[0] + c[1] + c[2] + c[3]), normal, material.base_color * tint,
-                        mesh.triangle_material[0]);
+                    add(0.25f * (c[0] + c[1] + c[2] + c[3]), normal, surface.albedo,
+                        mesh.triangle_material[t], surface.finish);
             }
             return;
         }
@@ -173,27 +211,30 @@ private:
                 surfaceAt(mesh, scene_.materials, scene_.textures, uint32_t(t), a, b, {});
             const Vec3 flat = glm::cross(mesh.positions[v.y] - mesh.positions[v.x],
                                          mesh.positions[v.z] - mesh.positions[v.x]);
-            add(p, glm::dot(flat, surface.normal_object) < 0.0f ? -flat : flat, surface.albedo,
-                mesh.triangle_material[t]);
+            // Single-sided surfaces are seen from the side that their winding says.
+            const bool is_turned = scene_.materials[mesh.triangle_material[t]].double_sided &&
+                                   glm::dot(flat, surface.normal_object) < 0.0f;
+            add(p, is_turned ? -flat : flat, surface.albedo, mesh.triangle_material[t],
+                surface.finish);
         }
     }
 
-    uint8_t finishOf(uint16_t material) {
-        const auto found = finish_of_.find(material);
-        if (found != finish_of_.end()) return found->second;
-        if (finishes_.size() == 256) return 255;
-        SurfelFinish finish;
-        finish.material = Material();
-        const Material& from = scene_.materials[material];
-        finish.material.name = from.name;
-        finish.material.double_sided = from.double_sided;
-        finish.material.metallic = from.metallic;
-        finish.material.roughness = from.roughness;
-        finish.material.specular = from.specular;
-        finish.material.translucency = from.translucency;
-        finish.material.unlit = from.unlit;
-        finishes_.push_back(finish);
-        return finish_of_[material] = uint8_t(finishes_.size() - 1);
+    // One a material, but for whether its textures make it shine or metal: splats end where another
+    // begins. As rough as its points are in the mean.
+    void makeFinishesOfPoints() {
+        std::map<uint32_t, uint8_t> index_of;
+        for (const uint32_t key : finish_key_) index_of[key] = 0;
+        const std::vector<float> no_width(scene_.materials.size(), 0.0f);
+        finishes_ = makeFinishes(scene_.materials, no_width, index_of);
+        std::vector<double> roughness(finishes_.size(), 0.0), count(finishes_.size(), 0.0);
+        for (size_t i = 0; i < points_.size(); ++i) {
+            const uint8_t f = points_[i].finish = index_of.at(finish_key_[i]);
+            roughness[f] += double(roughness_[i]);
+            count[f] += 1.0;
+        }
+        for (size_t f = 0; f < finishes_.size(); ++f)
+            finishes_[f].material.roughness = float(roughness[f] / count[f]);
+        finish_key_ = {}, roughness_ = {};
     }
 
     // How far points are from the nearest of the splats that cover them, as the model keeps these.
@@ -213,22 +254,25 @@ private:
         }
     }
 
+    static constexpr uint32_t kNone = 0xffffffffu;
+
     const Scene& scene_;
     const SplatOptions& options_;
     ThreadPool& pool_;
     const CancelFlag& cancel_;
-    const std::function<void(double)>& progress_;
+    const BuildProgress& progress_;
     DVec3 middle_ = DVec3(0.0);
     SplatPoints points_;  // relative to the middle
     std::vector<SurfelFinish> finishes_;
-    std::map<uint16_t, uint8_t> finish_of_;
+    std::vector<uint32_t> finish_key_;  // a point, until finishes are made; and as rough as that
+    std::vector<float> roughness_;
 };
 
 }  // namespace
 
 SurfelModel buildSplats(const Scene& scene, const SplatOptions& options, ThreadPool& pool,
-                        const CancelFlag& cancel,
-                        const std::function<void(double fraction)>& progress, SplatReport& report) {
+                        const CancelFlag& cancel, const BuildProgress& progress,
+                        SplatReport& report) {
     return SplatBuilder(scene, options, pool, cancel, progress).build(report);
 }
 

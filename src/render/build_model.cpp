@@ -11,8 +11,9 @@ SurfelModel buildPointBlockModel(const Scene& scene, const PointBlockOptions& op
                                  ThreadPool& pool, const CancelFlag& cancel,
                                  const std::function<void(double fraction)>& progress,
                                  PointBlockReport& report) {
-    MemoryBudget(0).require(pointBlockBytes(options), "--set",
-                            "point blocks of this resolution and so many directions");
+    budgetBeside(scene, options.memory_limit_mb)
+        .require(pointBlockBytes(options), "--set",
+                 "point blocks of this resolution, tolerance angle and so many directions");
     const DBox3 bounds = sceneBounds(scene);
     const DVec3 center = bounds.isEmpty() ? DVec3(0.0) : 0.5 * (bounds.min + bounds.max);
     const auto caster = makeEmbreeRayCaster(scene, center, pool.threadCount());

@@ -59,8 +59,9 @@ struct BuildJob {
     const Scene& scene;
     ThreadPool& pool;
     const CancelFlag& cancel;
-    std::function<void(double)> progress;
+    BuildProgress progress;
     std::string source;  // file name
+    uint64_t memory_limit_mb = 0;
 };
 
 // A kind of model: its options, and how it is made.
@@ -76,6 +77,10 @@ std::string formatted(const char* format, Values... values) {
     char line[512];
     std::snprintf(line, sizeof line, format, values...);
     return line;
+}
+
+std::string counted(uint64_t n, const char* thing) {
+    return std::to_string(n) + " " + thing + (n == 1 ? "" : "s");
 }
 
 Json surfelReport(const SurfelModel& model, size_t bytes) {
@@ -99,18 +104,21 @@ public:
     }
     Built build(const BuildJob& job) const override {
         PointBlockReport r;
-        SurfelModel model =
-            buildPointBlockModel(job.scene, options_, job.pool, job.cancel, job.progress, r);
+        auto options = options_;
+        options.memory_limit_mb = job.memory_limit_mb;
+        SurfelModel model = buildPointBlockModel(
+            job.scene, options, job.pool, job.cancel,
+            [&](double fraction) { job.progress("points", fraction); }, r);
         model.source = job.source;
         Built built;
         built.text = surfelFileText(model);
         built.report = surfelReport(model, built.text.size());
         const size_t surfels = built.report["surfels_all_levels"];
-        built.line = formatted(
-            "%zu points in %zu blocks at the finest of %zu levels, %zu points in all; "
-            "%.1f bits a point",
-            model.levels[0].size(), model.levels[0].blocks.size(), model.levels.size(), surfels,
-            8.0 * double(built.text.size()) / double(surfels));
+        built.line = counted(model.levels[0].size(), "point") + " in " +
+                     counted(model.levels[0].blocks.size(), "block") + " at the finest of " +
+                     counted(model.levels.size(), "level") + ", " + counted(surfels, "point") +
+                     formatted(" in all; %.1f bits a point",
+                               8.0 * double(built.text.size()) / double(surfels));
         built.report.update({{"seconds", r.seconds},
                              {"rays", r.rays},
                              {"samples_hit", r.samples_hit},
@@ -130,17 +138,32 @@ public:
     }
     Built build(const BuildJob& job) const override {
         SplatReport r;
-        SurfelModel model = buildSplats(job.scene, options_, job.pool, job.cancel, job.progress, r);
+        auto options = options_;
+        options.memory_limit_mb = job.memory_limit_mb;
+        SurfelModel model = buildSplats(job.scene, options, job.pool, job.cancel, job.progress, r);
         model.source = job.source;
+        if (r.same_places > 0) {
+            printMessage("warning: " + job.source + ": " + counted(r.same_places, "point") +
+                         (r.same_places == 1 ? " is" : " are") +
+                         "  left out: others lie at the very same places; the first of "
+                         "each is kept");
+        }
         Built built;
         built.text = surfelFileText(model);
         built.report = surfelReport(model, built.text.size());
-        built.line = formatted(
-            "%llu points, %llu splats; points lie within %.3g m of them, %.3g m on average",
-            static_cast<unsigned long long>(r.points), static_cast<unsigned long long>(r.splats),
-            r.largest_distance, r.mean_distance);
+        const std::string on_meshes =
+            r.points_on_meshes == 0 ? ""
+            : r.points_on_meshes == r.points
+                ? " on meshes"
+                : formatted(" (%llu on meshes)",
+                            static_cast<unsigned long long>(r.points_on_meshes));
+        built.line = counted(r.points, "point") + on_meshes + ", " + counted(r.splats, "splat") +
+                     formatted("; points lie within %.3g m of them, %.3g m on average",
+                               r.largest_distance, r.mean_distance);
         built.report.update({{"seconds", r.seconds},
                              {"points", r.points},
+                             {"points_on_meshes", r.points_on_meshes},
+                             {"same_places", r.same_places},
                              {"tolerance", r.tolerance},
                              {"largest_distance", r.largest_distance},
                              {"mean_distance", r.mean_distance}});
@@ -158,16 +181,17 @@ public:
     }
     Built build(const BuildJob& job) const override {
         HybridReport r;
-        HybridModel model = buildHybrid(job.scene, options_, job.pool, job.cancel, job.progress, r);
+        auto options = options_;
+        options.memory_limit_mb = job.memory_limit_mb;
+        HybridModel model = buildHybrid(job.scene, options, job.pool, job.cancel, job.progress, r);
         model.source = job.source;
         Built built;
         built.text = hybridFileText(model);
-        built.line = formatted(
-            "%llu triangles in %u clusters (%.0f %% in flat ones), %u patches; %llu surfels, %llu "
-            "in all levels",
-            static_cast<unsigned long long>(r.triangles), r.clusters, 100.0 * r.flat_share,
-            r.patches, static_cast<unsigned long long>(r.surfels),
-            static_cast<unsigned long long>(r.surfels_all_levels));
+        built.line = counted(r.triangles, "triangle") + " in " + counted(r.clusters, "cluster") +
+                     formatted(" (%.0f %% in flat ones), ", 100.0 * r.flat_share) +
+                     (r.patches == 1 ? "1 patch" : std::to_string(r.patches) + " patches") + "; " +
+                     counted(r.surfels, "surfel") + ", " + std::to_string(r.surfels_all_levels) +
+                     " in all levels";
         built.report = {{"schema", 1},
                         {"kind", "hybrid"},
                         {"triangles", r.triangles},
@@ -232,7 +256,7 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
         ->check(CLI::Range(0, 1024).description(""))
         ->group("Running");
     app.add_option("--memory-limit", memory_limit_mb,
-                   "most memory that loading may take, in MB (default: the machine's)")
+                   "most memory that loading and building may take, in MB (default: the machine's)")
         ->type_name("MB")
         ->group("Running");
     app.add_flag("--allow-outside", allow_outside, "let a scene's paths leave its folder")
@@ -271,9 +295,10 @@ ExitCode runBuild(const std::vector<std::string>& arguments) {
 
     Built built;
     try {
-        built = model_kind->build({scene, pool, cancel,
-                                   [&](double fraction) { progress.update("build", fraction); },
-                                   std::filesystem::path(input).filename().string()});
+        built = model_kind->build(
+            {scene, pool, cancel,
+             [&](const char* step, double fraction) { progress.update(step, fraction); },
+             std::filesystem::path(input).filename().string(), memory_limit_mb});
     } catch (const Error& error) {
         if (error.where().empty() && error.code() == ErrorCode::kInvalidArgument)
             throw Error(ErrorCode::kInvalidScene, input, error.what());

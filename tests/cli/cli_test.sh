@@ -296,6 +296,7 @@ case_path_pictures() {
 case_memory_limit() {
     "$stipple" generate terrain --count 2000000 -o terrain.glb >/dev/null || fail "cannot generate"
     expect_error 1 'terrain\.glb' info terrain.glb --memory-limit 20
+    expect_error 1 'points to make splats of' build terrain.glb --as splats --set points=100000000 --memory-limit 2000 -o t.stipple
 }
 
 case_render_png() {
@@ -1012,7 +1013,7 @@ JSON
 case_build_hybrid() {
     write_scene
     expect_ok build scene.scene.json --as hybrid -o ball.stipple --json built.json
-    expect_stdout '[0-9]+ triangles in [0-9]+ clusters \([0-9]+ % in flat ones\), [0-9]+ patches; [0-9]+ surfels'
+    expect_stdout '[0-9]+ triangles in 1 cluster \([0-9]+ % in flat ones\), 1 patch; [0-9]+ surfels'
     grep -q '"cluster_seconds"' built.json || fail "no report"
     expect_ok render ball.stipple -o ball.png "${tiny[@]}"
     expect_ok render scene.scene.json -o source.png "${tiny[@]}"
@@ -1044,7 +1045,11 @@ JSON
 case_build_errors() {
     write_scene
     expect_ok build scene.scene.json --as splats -o splats.stipple --set points=2000
-    expect_stdout '2000 points, [0-9]+ splats'
+    expect_stdout '2000 points on meshes, [0-9]+ splats'
+    for step in load points normals splats; do grep -qE "^$step: [0-9.]+ s\$" stderr.txt || fail "no line of $step"; done
+    printf 'ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n1 2 3\n' >one.ply
+    expect_ok build one.ply --as splats -o one.stipple
+    expect_stdout ': 1 point, 1 splat; '
     expect_ok render splats.stipple -o splats.png "${tiny[@]}" --reconstruct ewa
     expect_error 2 'tolerance' build scene.scene.json --as splats -o a.stipple --set tolerance=0
     expect_error 2 "'voxels'" build scene.scene.json --as voxels -o a.stipple

@@ -40,7 +40,7 @@ Scene modelOf(const Scene& source, const HybridOptions& options, ThreadPool& poo
     HybridReport report;
     const CancelFlag cancel;
     const std::string text = hybridFileText(buildHybrid(
-        source, options, pool, cancel, [](double) {}, report));
+        source, options, pool, cancel, [](const char*, double) {}, report));
     MemoryBudget budget(0);
     Scene scene;
     const ChildRef child = addHybridModel(scene, parseHybridFile(text, budget, "model"), "model");

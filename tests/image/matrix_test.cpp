@@ -77,7 +77,7 @@ protected:
         fs::create_directories(folder_);
         ThreadPool pool(2);
         const CancelFlag cancel;
-        const auto quiet = [](double) {};
+        const auto quiet = [](auto&&...) {};
         const Scene ring = load(std::string(R"("a": )") + kRing, R"({"child": "a"})", pool);
         PointBlockOptions blocks;
         blocks.resolution = 128;

@@ -9,6 +9,7 @@
 #include <scenegraph/io/surfel_file.h>
 #include <scenegraph/procedural/generators.h>
 #include <tests/image/model_views.h>
+#include <tests/image/test_scene.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -91,6 +92,25 @@ void expectLikeRays(GeneratedMesh made, int pixels, int step, double least_db, d
     }
     EXPECT_GE(worst, least_db);
     EXPECT_LE(holes, most_holes);  // in all pictures
+}
+
+// Lattices are finer where surfaces may be tilted more, and squares are smaller than triangles.
+TEST(PointBlocks, finerLatticesNeedMoreMemory) {
+    PointBlockOptions usual, steep, squares;
+    steep.tolerance_angle = 80.0;
+    squares.equilateral = false;
+    EXPECT_GT(pointBlockBytes(squares), 1.1 * pointBlockBytes(usual));
+    EXPECT_GT(pointBlockBytes(steep), 961e6);  // what a bunny takes
+    EXPECT_LT(pointBlockBytes(usual), 300e6);
+    steep.memory_limit_mb = 900;
+    TestScene scene;
+    scene.add(makePrimitive("box", 12, Vec3(0.5f)), Affine());
+    ThreadPool pool(1);
+    const CancelFlag cancel;
+    PointBlockReport report;
+    EXPECT_THROW(buildPointBlockModel(
+                     scene.build(), steep, pool, cancel, [](double) {}, report),
+                 Error);
 }
 
 TEST(PointBlocks, surfacesLookLikeRaysFromAnywhere) { expectLikeRays(torus(), 128, 5, 28.0, 4); }

@@ -33,7 +33,7 @@ Scene modelOf(const Scene& source, const SplatOptions& options, ThreadPool& pool
     const std::filesystem::path path = std::filesystem::temp_directory_path() /
                                        ("stipple-splats-" + std::to_string(getpid()) + ".stipple");
     std::ofstream(path, std::ios::binary) << surfelFileText(buildSplats(
-        source, options, pool, cancel, [](double) {}, report));
+        source, options, pool, cancel, [](const char*, double) {}, report));
     Diagnostics diagnostics;
     Scene scene = loadScene(path.string(), {true, 0, nullptr}, pool, diagnostics);
     std::filesystem::remove(path);
@@ -201,7 +201,7 @@ TEST(Splats, nothingReachesBeyondABox) {
     const CancelFlag cancel;
     SplatReport report;
     const SurfelModel model = buildSplats(
-        sourceOf(box()), optionsOf(0.1, false), pool, cancel, [](double) {}, report);
+        sourceOf(box()), optionsOf(0.1, false), pool, cancel, [](const char*, double) {}, report);
     EXPECT_LE(reachOf(model), 0.5f + float(3.0 * report.tolerance));
 }
 
@@ -217,7 +217,7 @@ TEST(Splats, nothingReachesFarBeyondABorder) {
         options.has_cuts = has_cuts;
         SplatReport report;
         const SurfelModel model = buildSplats(
-            source, options, pool, cancel, [](double) {}, report);
+            source, options, pool, cancel, [](const char*, double) {}, report);
         EXPECT_LT(report.splats, kPoints / 50);
         const float beyond = (reachOf(model) - 0.5f) / spacing;
         if (has_cuts)

@@ -182,6 +182,22 @@ TEST(IoGltf, assemblesStripsAndFansWithOneOrientation) {
     }
 }
 
+// As clouds of PLY files, which builders take by their points; not where there are triangles, too.
+TEST(IoGltf, meshesOfNothingButPointsAreClouds) {
+    GltfBuilder b = GltfBuilder::triangle();
+    Json points = b.primitive();
+    points["mode"] = 0;
+    points.erase("indices");
+    b.json["meshes"][0]["primitives"].push_back(points);
+    EXPECT_FALSE(meshOf(load(b)).is_cloud);
+    b.json["meshes"][0]["primitives"][0] = points;
+    points["attributes"]["POSITION"] = b.addFloats({5, 0, 0, 5, 1, 0, 5, 0, 1}, "VEC3");
+    b.json["meshes"][0]["primitives"][1] = points;
+    const Loaded loaded = load(b);
+    EXPECT_TRUE(meshOf(loaded).is_cloud);
+    EXPECT_EQ(meshOf(loaded).positions.size(), 24u);
+}
+
 TEST(IoGltf, skipsLinesWithOneWarning) {
     GltfBuilder b = GltfBuilder::triangle();
     for (int mode : {1, 2, 3}) {

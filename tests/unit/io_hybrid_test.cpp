@@ -36,7 +36,7 @@ HybridModel build(const Scene& scene, const HybridOptions& options, int threads 
     const CancelFlag cancel;
     HybridReport report;
     return buildHybrid(
-        scene, options, pool, cancel, [](double) {}, report);
+        scene, options, pool, cancel, [](const char*, double) {}, report);
 }
 
 GeneratedMesh torus(int triangles) {
@@ -71,6 +71,31 @@ std::vector<Vec3> placesOn(const HybridModel& model, int n) {
                          model.mesh.positions[c.z] * v);
     }
     return places;
+}
+
+// Next to no area, but long borders.
+TEST(Hybrid, samplesOfBordersCountAgainstTheMemory) {
+    GeneratedMesh needles;
+    for (uint32_t i = 0; i < 100; ++i) {
+        const float x = 0.01f * float(i);
+        needles.mesh.positions.insert(needles.mesh.positions.end(),
+                                      {Vec3(x, 0, 0), Vec3(x, 1, 0), Vec3(x + 1e-5f, 0, 0)});
+        needles.mesh.triangles.emplace_back(3 * i, 3 * i + 1, 3 * i + 2);
+        needles.mesh.triangle_material.push_back(0);
+    }
+    needles.materials.emplace_back();
+    const Scene scene = sceneOf(std::move(needles));
+    HybridOptions options;
+    options.spacing = 0.02;
+    options.memory_limit_mb = 50;
+    try {
+        build(scene, options);
+        ADD_FAILURE() << "some 700 000 samples were taken in 50 MB";
+    } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kOutOfMemory) << error.what();
+    }
+    options.spacing = 1.0;
+    EXPECT_FALSE(build(scene, options).patches.empty());
 }
 
 TEST(Hybrid, surfelsCoverTheSurfaceAtEveryLevel) {

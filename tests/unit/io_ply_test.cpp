@@ -140,6 +140,21 @@ TEST(IoPly, leavesOutWhatIsNotFiniteWithAWarning) {
     EXPECT_GT(single.scene.meshes.at(0).area, 0.0);
 }
 
+// Many at one place would be each other's neighbours.
+TEST(IoPly, joinsPointsAtTheVerySamePlace) {
+    std::string text = plyHeader("ascii", "element vertex 20004\n" + kVertices);
+    text += "1 0 0 255 0 0\n0 0 0 0 255 0\n-0 0 0 0 0 255\n0 1 0 255 255 255\n";
+    for (int i = 0; i < 20000; ++i) text += "0 -0 0 0 0 0\n";
+    const Loaded cloud = tryLoadText("t.ply", text);
+    ASSERT_EQ(cloud.error, "");
+    const Mesh& mesh = cloud.scene.meshes.at(0);
+    ASSERT_EQ(mesh.positions.size(), 12u);
+    EXPECT_EQ(mesh.colors[4], Vec4(0, 1, 0, 1)) << "of the first";
+    ASSERT_EQ(cloud.diagnostics.warnings.size(), 1u);
+    EXPECT_NE(cloud.diagnostics.warnings[0].find("20001 points are left out: others lie at the"),
+              std::string::npos);
+}
+
 TEST(IoPly, namesThePlaceOfWhatIsWrong) {
     EXPECT_EQ(tryLoadText("t.ply", "").error, "t.ply: does not start with a line \"ply\"");
     EXPECT_EQ(tryLoadText("t.ply", "ply\nformat ascii 1.0\nelement vertex x\n").error,

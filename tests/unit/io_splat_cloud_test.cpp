@@ -201,6 +201,8 @@ TEST(PointIndex, findsWhatASearchOfAllFinds) {
         while (n < all.size() && all[n].squared <= 0.25f) ++n;
         ASSERT_EQ(found.size(), n);
         for (size_t k = 0; k < n; ++k) EXPECT_EQ(found[k].index, all[k].index);
+        EXPECT_EQ(index.countWithin(p, 0.5f, positions.size()), n);
+        EXPECT_EQ(index.countWithin(p, 0.5f, n / 2) > n / 2, n > n / 2);
     }
 }
 

@@ -6,6 +6,9 @@
 #include <gtest/gtest.h>
 #include <scenegraph/io/load.h>
 #include <scenegraph/io/splats.h>
+#include <scenegraph/surface_at.h>
+#include <scenegraph/surfel_finish.h>
+#include <tests/image/test_scene.h>
 
 #include <unistd.h>
 
@@ -48,7 +51,7 @@ SurfelModel build(const Scene& scene, const SplatOptions& options, SplatReport& 
     ThreadPool pool(threads);
     const CancelFlag cancel;
     return buildSplats(
-        scene, options, pool, cancel, [](double) {}, report);
+        scene, options, pool, cancel, [](const char*, double) {}, report);
 }
 
 // Over the splats of a sphere, half an ellipse from their middles.
@@ -160,6 +163,182 @@ TEST(Splats, coloursAreKept) {
             EXPECT_GT(s.position.x < 0.495f ? s.albedo.r : s.albedo.b, 0.9f);
         }
     }
+}
+
+// Spheres that run into each other, one of them small and low: whoever guesses from the points
+// where outside is turns some inside out.
+TEST(Splats, surfacesFaceAsTheirMeshesDo) {
+    const std::vector<std::pair<DVec3, double>> spheres = {{{0, 2, 0}, 2.0},
+                                                           {{0.7, 1.1, 0.2}, 1.2},
+                                                           {{-0.6, 1.0, 0.5}, 1.1},
+                                                           {{0.1, 0.2, 0.6}, 0.8},
+                                                           {{3, 0, 0}, 1.0}};
+    TestScene scene;
+    // The last is mirrored.
+    for (const auto& [center, size] : spheres)
+        scene.add(makePrimitive("sphere", 200, Vec3(0.5f)),
+                  placed(center, DVec3(center.x < 3.0 ? size : -size, size, size)));
+    SplatOptions options;
+    options.points = 5000;
+    SplatReport report;
+    const SurfelModel model = build(scene.build(), options, report);
+    EXPECT_EQ(report.points, 25000u);
+    const SurfelLevel& level = model.levels[0];
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            // Of one of those that it lies on.
+            double most = -1.0;
+            for (const auto& [center, size] : spheres) {
+                const DVec3 d = DVec3(s.position) - center;
+                if (std::abs(glm::length(d) - 0.5 * size) < 0.05)
+                    most = std::max(most, glm::dot(DVec3(s.normal), d));
+            }
+            EXPECT_GT(most, 0.0) << i;
+        }
+    }
+}
+
+// Two sides of a leaf, each of its own: neither ends where the other is.
+TEST(Splats, sheetsBackToBackAreFewSplats) {
+    TestScene scene;
+    scene.add(makePrimitive("plane", 200, Vec3(0.5f)), Affine());
+    Affine turned;
+    turned.linear = DMat3(1, 0, 0, 0, -1, 0, 0, 0, -1);
+    scene.add(makePrimitive("plane", 200, Vec3(0.5f)), turned);
+    scene.build();
+    for (Material& material : scene.scene.materials) material.double_sided = false;
+    SplatOptions options;
+    options.points = 5000;
+    SplatReport report;
+    const SurfelModel model = build(scene.scene, options, report);
+    EXPECT_GE(report.splats, 2u);
+    EXPECT_LE(report.splats, 40u);
+}
+
+// A disc as thin as the tolerance, soon: its other side is no reason for smaller splats, nor is a
+// tolerance larger than what was looked at.
+TEST(Splats, areNoMoreWhereTheToleranceIsLarger) {
+    std::vector<std::string> lines;
+    for (int i = 0; i < 8000; ++i) {
+        const double z = 1.0 - (2.0 * i + 1.0) / 8000, a = 2.399963 * i, r = std::sqrt(1 - z * z);
+        lines.push_back(std::to_string(r * std::cos(a)) + " " + std::to_string(0.15 * z) + " " +
+                        std::to_string(r * std::sin(a)));
+    }
+    const Scene scene = cloudScene(lines, "");
+    uint64_t before = 1000;
+    for (const double tolerance : {0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 50.0}) {
+        SplatOptions options;
+        options.tolerance = tolerance;
+        SplatReport report;
+        build(scene, options, report);
+        EXPECT_LE(report.splats, before + before / 20 + 2) << tolerance;
+        EXPECT_LE(report.largest_distance, report.tolerance * 1.0001);
+        before = report.splats;
+    }
+    EXPECT_LE(before, 60u);
+}
+
+// What is small and finely sampled lies within a few points' distance on what is large.
+TEST(Splats, smallThingsOnALargePlaneAreFew) {
+    TestScene scene;
+    scene.add(makePrimitive("plane", 2, Vec3(0.5f)), placed(DVec3(0.0), DVec3(40.0)));
+    for (int i = 0; i < 4; ++i) {
+        scene.add(makePrimitive("torus", 2000, Vec3(0.5f)),
+                  placed(DVec3(1.5 * i, 0.15, 0), DVec3(0.5)));
+    }
+    SplatOptions options;
+    options.points = 20000;
+    SplatReport report;
+    build(scene.build(), options, report);
+    EXPECT_EQ(report.points, 100000u);
+    EXPECT_LE(report.splats, 300u);
+}
+
+TEST(Splats, shineAsTheirMaterialsDo) {
+    TestScene scene;
+    scene.add(makePrimitive("sphere", 200, Vec3(0.5f)), Affine());
+    Material& material = scene.scene.materials[0];
+    material.emissive = Vec3(3, 2, 1);
+    material.specular_weight = 0.25f;
+    material.roughness = 0.3f;
+    SplatOptions options;
+    options.points = 1000;
+    SplatReport report;
+    const SurfelModel model = build(scene.build(), options, report);
+    ASSERT_EQ(model.finishes.size(), 1u);
+    EXPECT_EQ(model.finishes[0].material.emissive, Vec3(3, 2, 1));
+    EXPECT_EQ(model.finishes[0].material.specular_weight, 0.25f);
+    EXPECT_EQ(model.finishes[0].material.roughness, 0.3f);
+}
+
+// More materials than a model has finishes: alike ones share one.
+TEST(Splats, ofVeryManyMaterialsAlikeOnesAreJoined) {
+    std::vector<Material> materials(1000);
+    std::map<uint32_t, uint8_t> index_of, few;
+    for (uint32_t i = 0; i < 1000; ++i) {
+        Material& m = materials[i];
+        m.double_sided = i % 2;
+        m.unlit = i % 7 == 0;
+        m.roughness = float(i % 100) / 100.0f;
+        m.emissive = Vec3(i % 5 == 0 ? 4.0f : 0.0f);
+        index_of[finishKey(materials, i, plainFinish(m))] = 0;
+        // 200 of them, most with numbers above 255.
+        if (i >= 800) few[finishKey(materials, i, plainFinish(m))] = 0;
+    }
+    ASSERT_EQ(index_of.size(), 1000u);
+    const std::vector<float> width(1000, 1.0f);
+    const std::vector<SurfelFinish> finishes = makeFinishes(materials, width, index_of);
+    EXPECT_LE(finishes.size(), 256u);
+    EXPECT_GE(finishes.size(), 20u);
+    EXPECT_EQ(makeFinishes(materials, width, few).size(), 200u);
+    for (uint32_t i = 0; i < 1000; ++i) {
+        const uint32_t key = finishKey(materials, i, plainFinish(materials[i]));
+        const Material& m = finishes[index_of.at(key)].material;
+        EXPECT_EQ(m.double_sided, materials[i].double_sided) << i;
+        EXPECT_EQ(m.unlit, materials[i].unlit) << i;
+        EXPECT_NEAR(m.roughness, materials[i].roughness, 0.1f) << i;
+        EXPECT_EQ(m.emissive, materials[i].emissive) << i;
+        if (i < 800) continue;
+        EXPECT_EQ(few.at(key), i - 800);
+    }
+}
+
+TEST(Splats, tooManyPointsAreRefusedBeforeTheyAreTaken) {
+    TestScene scene;
+    scene.add(makePrimitive("box", 12, Vec3(0.5f)), Affine());
+    for (int i = 0; i < 999; ++i) scene.root.instances.add(ChildRef::mesh(0), Affine());
+    scene.build();
+    const auto errorOf = [&](int points, uint64_t limit_mb) {
+        SplatOptions options;
+        options.points = points;
+        options.memory_limit_mb = limit_mb;
+        SplatReport report;
+        try {
+            build(scene.scene, options, report);
+        } catch (const Error& error) {
+            return error.code();
+        }
+        return ErrorCode::kInternal;
+    };
+    EXPECT_EQ(errorOf(200000, 500), ErrorCode::kUnsupported);  // 2 * 10^8
+    EXPECT_EQ(errorOf(20000, 500), ErrorCode::kOutOfMemory);
+}
+
+TEST(Splats, whatIsThereTwiceCountsOnce) {
+    TestScene once, twice;
+    once.add(makePrimitive("torus", 200, Vec3(0.5f)), Affine());
+    twice.add(makePrimitive("torus", 200, Vec3(0.5f)), Affine());
+    twice.root.instances.add(ChildRef::mesh(0), Affine());
+    SplatOptions options;
+    options.points = 2000;
+    SplatReport of_once, of_twice;
+    build(once.build(), options, of_once);
+    build(twice.build(), options, of_twice);
+    EXPECT_EQ(of_once.same_places, 0u);
+    EXPECT_EQ(of_twice.same_places, 2000u);
+    EXPECT_EQ(of_twice.points, 2000u);
+    EXPECT_EQ(of_twice.splats, of_once.splats);
 }
 
 TEST(Splats, oddCloudsAreHandled) {
