@@ -20,15 +20,17 @@ void bendNormals(const SplatPoints& points, const std::vector<uint32_t>& covered
         const Vec3 d = p.position - splat.center;
         const double a = double(glm::dot(d, splat.along)) * scale,
                      b = double(glm::dot(d, across)) * scale;
-        const double facing = double(glm::dot(p.normal, splat.normal));
+        const Vec3& normal = p.shading_normal != Vec3(0) ? p.shading_normal : p.normal;
+        const double facing = double(glm::dot(normal, splat.normal));
         constexpr double kLeastFacing = 0.3;
         if (facing < kLeastFacing) continue;
         Vector5 u, v;
         u << 1.0, 0.0, a, 0.0, b;
         v << 0.0, 1.0, 0.0, b, a;
         sums += u * u.transpose() + v * v.transpose();
-        right += u * (double(glm::dot(p.normal, splat.along)) / facing) +
-                 v * (double(glm::dot(p.normal, across)) / facing);
+        const double to_u = double(glm::dot(normal, splat.along)) / facing,
+                     to_v = double(glm::dot(normal, across)) / facing;
+        right += u * to_u + v * to_v;
     }
     // What few points in a row do not say stays flat.
     constexpr double kStiffness = 0.01;

@@ -17,8 +17,9 @@ struct SplatPoint {
     float spacing = 0.0f;    // mean distance to the nearest points
     float roughness = 0.0f;  // of the neighbourhood: how little it is a plane, 0..1/3
     uint8_t finish = 0;
-    bool is_at_crease = false;  // its plane is that of one side
-    bool is_facing = false;     // its normal is that of a surface, and stays
+    bool is_at_crease = false;      // its plane is that of one side
+    bool is_facing = false;         // its normal is that of a surface, and stays
+    Vec3 shading_normal = Vec3(0);  // unit, of a surface; null: `normal` is as good
 };
 
 using SplatPoints = std::vector<SplatPoint>;

@@ -159,14 +159,20 @@ private:
         if (mesh.triangles.empty()) return;
         DMat3 area_map = cofactor(world_from_object.linear);
         const double side = glm::dot(world_from_object.linear[0], area_map[0]) < 0.0 ? -1.0 : 1.0;
-        const auto add = [&](const Vec3& p, const Vec3& normal, const Vec3& albedo,
-                             uint16_t material, SurfaceFinish finish) {
+        const auto add = [&](const Vec3& p, const Vec3& normal, const Vec3& shading_normal,
+                             const Vec3& albedo, uint16_t material, SurfaceFinish finish) {
             SplatPoint point;
             point.is_facing = !mesh.is_cloud;
             point.position = Vec3(world_from_object.point(DVec3(p)) - middle_);
             const DVec3 facing = area_map * DVec3(normal) * side;
             if (!(glm::length(facing) > 0.0)) return;  // of no area in the world
             point.normal = Vec3(glm::normalize(facing));
+            const DVec3 shading = area_map * DVec3(shading_normal) * side;
+            if (point.is_facing && glm::length(shading) > 0.0) {
+                point.shading_normal = Vec3(glm::normalize(shading));
+                if (glm::dot(point.shading_normal, point.normal) < 0.0f)
+                    point.shading_normal = -point.shading_normal;
+            }
             for (int k = 0; k < 3; ++k)
                 point.color[k] = srgbFromLinear(std::clamp(albedo[k], 0.0f, 1.0f));
             roughness_.push_back(finish.roughness);
@@ -187,7 +193,7 @@ private:
                 const MeshSurface surface =
                     surfaceAt(mesh, scene_.materials, scene_.textures, t, 0.3f, 0.3f, {});
                 if (glm::dot(normal, normal) > 0.0f)
-                    add(0.25f * (c[0] + c[1] + c[2] + c[3]), normal, surface.albedo,
+                    add(0.25f * (c[0] + c[1] + c[2] + c[3]), normal, normal, surface.albedo,
                         mesh.triangle_material[t], surface.finish);
             }
             return;
@@ -214,8 +220,8 @@ private:
             // Single-sided surfaces are seen from the side that their winding says.
             const bool is_turned = scene_.materials[mesh.triangle_material[t]].double_sided &&
                                    glm::dot(flat, surface.normal_object) < 0.0f;
-            add(p, is_turned ? -flat : flat, surface.albedo, mesh.triangle_material[t],
-                surface.finish);
+            add(p, is_turned ? -flat : flat, surface.normal_object, surface.albedo,
+                mesh.triangle_material[t], surface.finish);
         }
     }
 

@@ -1039,7 +1039,7 @@ JSON
     head -c 2000 ball.stipple >cut.stipple
     expect_error 3 'cut\.stipple: ' render cut.stipple -o a.png
     printf '\x09' | dd of=ball.stipple bs=1 seek=8 conv=notrunc status=none
-    expect_error 3 'has version 9; this program reads 1 to 3' render ball.stipple -o a.png
+    expect_error 3 'has version 9; this program reads 1 to 4' render ball.stipple -o a.png
 }
 
 case_build_errors() {
