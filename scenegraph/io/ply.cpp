@@ -12,6 +12,7 @@
 #include <bit>
 #include <charconv>
 #include <cstring>
+#include <sstream>
 
 namespace stipple {
 
@@ -383,6 +384,24 @@ void addPoints(PlyContents& contents, Mesh& mesh, const std::string& where, Load
     mesh.uvs = perCorner(discs, contents.uvs);
 }
 
+// Georeferenced positions are so far from the origin that single precision rounds them.
+void warnIfCoarse(const PlyContents& contents, const std::string& where, LoadContext& context) {
+    Box3 bounds;
+    for (const Vec3& p : contents.positions) {
+        if (glm::length(DVec3(p)) < 1e15) bounds.extend(p);
+    }
+    if (bounds.isEmpty()) return;
+    const Vec3 most = glm::max(glm::abs(bounds.min), glm::abs(bounds.max));
+    const double step = double(std::max({most.x, most.y, most.z})) * 0x1p-23;
+    constexpr double kMostShare = 1e-4;  // of the diagonal
+    if (step <= kMostShare * glm::length(DVec3(bounds.extent()))) return;
+    std::ostringstream text;
+    text.precision(3);
+    text << "positions are rounded to about " << step
+         << " m: they are single precision and far from the origin, take away their offset first";
+    context.warnOnce(where, text.str());
+}
+
 }  // namespace
 
 ChildRef loadPly(const std::filesystem::path& path, const std::string& name, Scene& scene,
@@ -391,6 +410,7 @@ ChildRef loadPly(const std::filesystem::path& path, const std::string& name, Sce
     const std::string bytes = readFile(path, context.budget, where);
     const PlyHeader header = parsePlyHeader(bytes, where);
     PlyContents contents = readContents(bytes, header, where, context);
+    warnIfCoarse(contents, where, context);
 
     Material material;
     material.name = "default";

@@ -106,6 +106,23 @@ std::string grid(int n, bool with_normals) {
     return text;
 }
 
+TEST(IoPly, positionsFarFromTheOriginAreWarnedOf) {
+    for (const int offset : {0, 2000, 2000000}) {
+        std::string text = plyHeader("ascii",
+                                     "element vertex 9\nproperty double x\nproperty double y\n"
+                                     "property double z\n");
+        for (int i = 0; i < 9; ++i)
+            text += std::to_string(offset + i % 3) + " " + std::to_string(i / 3) + " 0\n";
+        const Loaded loaded = tryLoadText("t.ply", text);
+        ASSERT_EQ(loaded.error, "");
+        ASSERT_EQ(loaded.diagnostics.warnings.size(), offset > 2000 ? 1u : 0u);
+        if (offset <= 2000) continue;
+        EXPECT_NE(loaded.diagnostics.warnings[0].find("positions are rounded to about 0.238 m"),
+                  std::string::npos)
+            << loaded.diagnostics.warnings[0];
+    }
+}
+
 TEST(IoPly, pointsFaceTheirNormalsOrTheSurfaceTheyLieOn) {
     for (const bool with_normals : {false, true}) {
         const Loaded loaded = tryLoadText("t.ply", grid(10, with_normals));
