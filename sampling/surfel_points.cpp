@@ -20,6 +20,8 @@ namespace {
 constexpr float kFewSubpixels = 3.0f;
 // Discs with a radius of more than this share of their distance are no ellipses in the picture.
 constexpr float kNearShare = 0.25f;
+// Nor are those that are seen edge on, with a radius of more than this share.
+constexpr float kEdgeOn = 0.1f, kEdgeOnShare = 0.02f;
 // A model whose coarsest level is finer than this share of what is wanted is far.
 constexpr float kFarShare = 0.5f;
 
@@ -128,12 +130,12 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         const float z = std::max(center.z - radius, view.near_z);
         const float per_metre_here =
             scaled_focal * (view.orthographic ? 1.0f : stretch(view, center, z) / z);
-        const bool are_near = !view.orthographic && sides.longest * reach > kNearShare * z;
-        const bool with_discs =
-            (may_be_discs || are_near) && sides.largest * per_metre_here > wanted;
+        has_near_ = !may_be_discs && !view.orthographic &&
+                    sides.longest * reach > kEdgeOnShare * z && findNear(placed, block, reach);
+        const bool with_discs = may_be_discs ? sides.largest * per_metre_here > wanted : has_near_;
         // Discs seen edge on cover no subpixel: their middles do.
         const bool with_points =
-            !with_discs || (may_be_discs && sides.smallest * per_metre_here < kFewSubpixels);
+            !may_be_discs || !with_discs || sides.smallest * per_metre_here < kFewSubpixels;
         if (with_discs || !may_be_discs) radius += model.discSide() * sides.longest * reach;
         if (center.z + radius <= view.near_z || center.z - radius > view.far_z) continue;
         const SubpixelRect rect = ballRect(view, center, radius, region);
@@ -144,6 +146,22 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         if (with_points) drawPoints(placed, block);
     }
     return true;
+}
+
+// Into is_near_. False if there are none.
+bool SurfelPoints::findNear(const Placed& placed, const SurfelBlock& block, float reach) {
+    bool has_near = false;
+    for (uint32_t i = 0; i < block.count; ++i) {
+        const Surfel s = unpackSurfel(placed.level, block, block.first + i);
+        const double z = placed.frame.camera_from_object.point(DVec3(s.position)).z;
+        const float side = placed.level.spacing * s.radius_share / std::sqrt(s.ratio);
+        const Vec3 to_eye = placed.eye.from(s.position);
+        const bool is_edge_on =
+            std::abs(glm::dot(s.normal, to_eye)) < kEdgeOn * glm::length(to_eye);
+        is_near_[i] = double(side * reach) > double(is_edge_on ? kEdgeOnShare : kNearShare) * z;
+        has_near = has_near || is_near_[i];
+    }
+    return has_near;
 }
 
 uint32_t SurfelPoints::addRun(const Placed& placed, uint32_t first, int numbers_shift) {
@@ -210,6 +228,7 @@ void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
     out.count = n;
     out.is_prebuilt = true;
     warpPoints(warp, placed.level.position.data() + b.first, n, addRun(placed, b.first, 0), out);
+    for (int i = 0; has_near_ && i < n; ++i) out.keep[i] &= uint8_t(!is_near_[size_t(i)]);
     const bool with_shapes = context_.sink->wantsSurfels();
     if (with_shapes || !placed.model.leaves_no_holes) {
         addWidths(placed, b);
@@ -314,9 +333,10 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
              ++k) {
             Surfel& s = surfels_[k - b.first];
             const Vec3 center(to_camera.point(DVec3(s.position)));
-            // With the front to the eye, and not all behind it.
+            // With the front to the eye, and not all behind it; among near ones these alone.
             const SurfelFinish& finish = placed.model.finishes[s.finish];
-            const bool is_front = !showsBack(placed.eye, finish.material, s.normal, s.position);
+            const bool is_front = !showsBack(placed.eye, finish.material, s.normal, s.position) &&
+                                  (!has_near_ || is_near_[k - b.first]);
             bool is_before_eye = false;
             s.normal = planes_[k - b.first];
             const int n = discPolygon(

@@ -21,6 +21,7 @@ public:
 private:
     struct Placed;
 
+    bool findNear(const Placed& placed, const SurfelBlock& block, float reach);
     void drawPoints(const Placed& placed, const SurfelBlock& block);
     void unpackDiscs(const SurfelLevel& level, const SurfelBlock& block);
     void addWidths(const Placed& placed, const SurfelBlock& block);
@@ -35,6 +36,9 @@ private:
     // Of a block whose discs are drawn; normals of the planes these lie in.
     std::array<Surfel, kBlockSurfels> surfels_;
     std::array<Vec3, kBlockSurfels> planes_;
+    // Of a block, for sinks that want surfels: those too near to be ellipses, drawn as polygons.
+    std::array<uint8_t, kBlockSurfels> is_near_ = {};
+    bool has_near_ = false;
 };
 
 // Attributes of a surfel of a run (Run::surfel_level) at sample.position_camera.
