@@ -22,6 +22,8 @@ constexpr float kSplatSigma = 0.5f;
 // A patch at least this many discs wide is a surface.
 constexpr float kWideInDiscs = 3.0f;
 const DiscShape kCircle;  // without cuts
+// Points so narrow are of a front no more than a subpixel before them.
+constexpr uint8_t kNarrowCode = patchWidthCode(1.0f, kFirstSubpixelExponent);
 
 struct Gathered {
     Vec3 albedo = Vec3(0), normal = Vec3(0);
@@ -180,10 +182,20 @@ private:
         return gathered_[size_t(y - inner_.y0) * size_t(inner_.width()) + size_t(x - inner_.x0)];
     }
 
+    // Of prebuilt models, whose normals say which side is out.
+    bool showsBack(const PointBlock& block, int i) const {
+        if (!block.is_prebuilt) return false;
+        const Vec3 normal(block.normal_x[i], block.normal_y[i], block.normal_z[i]);
+        return (context_.view.orthographic ? normal.z : glm::dot(normal, position(block, i))) >
+               0.0f;
+    }
+
     void gather(const PointBlock& block, int i) {
-        // Coarse discs are a surface's.
-        const uint8_t code =
-            block.is_coarse ? std::max(block.width[i], kSurfaceCode) : block.width[i];
+        // Coarse discs are a surface's. What shows its back lies behind a thin part's front, or is
+        // the front itself.
+        const uint8_t code = showsBack(block, i) ? kNarrowCode
+                             : block.is_coarse   ? std::max(block.width[i], kSurfaceCode)
+                                                 : block.width[i];
         SurfaceSample sample;
         bool is_looked_up = false;
         // How the normal turns along the half axes of a shape, a metre.

@@ -239,6 +239,32 @@ TEST(Splats, everyReconstructionShowsEllipses) {
     }
 }
 
+// The lit side of a thin plate does not shine through it, however small it is in the picture.
+TEST(Splats, whatLiesBehindAThinPartIsNotBlendedIn) {
+    ThreadPool pool(2);
+    TestScene scene;
+    scene.add(box(), placed(DVec3(0.0), DVec3(1.0, 1.0, 0.04)));
+    scene.build();
+    scene.scene.lighting.suns.push_back({glm::normalize(Vec3(0.1f, 0.3f, 1.0f)), Vec3(4.0f)});
+    const Scene source = scene.scene;
+    SplatReport report;
+    const Scene model = modelOf(source, optionsOf(0.1, false), pool, report);
+    const Camera camera = cameraTo(source, glm::normalize(Vec3(0.2f, 0.1f, -1.0f)), 24.0, 48);
+    const Image rays = draw(source, camera, 48, Method::kRaycast, 16, pool),
+                image = draw(model, camera, 48, Method::kPoints, 4, pool, 1, Reconstruct::kEwa);
+    double shown = 0.0, seen = 0.0;
+    int n = 0;
+    const int covered = rays.channelIndex("coverage");
+    for (int y = 0; y < 48; ++y) {
+        for (int x = 0; x < 48; ++x) {
+            if (rays.pixel(x, y)[covered] < 1.0f) continue;
+            shown += image.pixel(x, y)[0], seen += rays.pixel(x, y)[0], ++n;
+        }
+    }
+    EXPECT_GT(n, 100);
+    EXPECT_NEAR(shown / seen, 1.0, 0.03);
+}
+
 // Splats larger than their distance begin behind the eye and end far before it.
 TEST(Splats, aPlaneIsClosedFromJustAboveIt) {
     ThreadPool pool(2);
