@@ -85,12 +85,9 @@ std::vector<SearchStep> searchSettings(const RenderSettings& base,
             others.back().area_threshold = area;
             others.back().visible_size = visible;
         }
-        // Between the steps of the grid, and below it.
-        for (const double share : {0.7, 0.5}) {
-            if (share == 0.5 && around.samples > kSamples[0]) continue;
-            others.push_back(around);
-            others.back().samples *= share;
-        }
+        // Between the steps of the grid.
+        others.push_back(around);
+        others.back().samples *= 0.7;
         for (const RenderSettings& settings : others) {
             const bool is_known =
                 std::any_of(steps.begin(), steps.end(), [&](const SearchStep& step) {
