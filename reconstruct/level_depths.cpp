@@ -65,7 +65,7 @@ float LevelDepths::surfaceAt(int l, int x, int y) const {
     const size_t i = level.index(x, y);
     const float depth = level.native[i], finer = level.finer[i];
     if (!(finer < depth)) return depth;
-    const float step = kSlope * per_subpixel_ * float(1 << l) * (orthographic_ ? 1.0f : finer);
+    const float step = slope() * float(1 << l) * (orthographic_ ? 1.0f : finer);
     for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
             const int nx = std::clamp(x + dx, level.x0, level.x0 + level.width - 1),

@@ -145,7 +145,7 @@ public:
         if (r.same_places > 0) {
             printMessage("warning: " + job.source + ": " + counted(r.same_places, "point") +
                          (r.same_places == 1 ? " is" : " are") +
-                         "  left out: others lie at the very same places; the first of "
+                         " left out: others lie at the very same places; the first of "
                          "each is kept");
         }
         Built built;
