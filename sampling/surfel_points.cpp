@@ -84,6 +84,69 @@ float stretch(const View& view, const Vec3& p, float depth) {
     return view.orthographic ? 1.0f : std::max(glm::length(p) / depth, 1.0f);
 }
 
+// What blocks' balls are tested against. Camera space.
+struct Window {
+    float near_z, far_z;
+    // Edges of the region as x / z and y / z (orthographic: x and y), a little farther out.
+    float left, right, top, bottom;
+};
+
+Window windowOf(const View& view, const SubpixelRect& region) {
+    constexpr double kMargin = 2.0;  // subpixels: more than what floats may be off
+    return {view.near_z,
+            view.far_z,
+            float((region.x0 - kMargin - view.center_x) / view.focal),
+            float((region.x1 + kMargin - view.center_x) / view.focal),
+            float((region.y0 - kMargin - view.center_y) / view.focal),
+            float((region.y1 + kMargin - view.center_y) / view.focal)};
+}
+
+// Blocks that are tested at once.
+constexpr int kTestedBlocks = 256;
+
+template <bool kOrthographic>
+inline __attribute__((always_inline)) void testLoop(
+    const Window& window, const Mat3& linear, const Vec3& middle, float reach,
+    const float* __restrict x, const float* __restrict y, const float* __restrict z,
+    const float* __restrict radius, int count, int32_t* __restrict may_show) {
+    // Plain locals and integers for truth, or the compiler will not vectorize.
+    const float xx = linear[0].x, xy = linear[0].y, xz = linear[0].z;
+    const float yx = linear[1].x, yy = linear[1].y, yz = linear[1].z;
+    const float zx = linear[2].x, zy = linear[2].y, zz = linear[2].z;
+    const float mx = middle.x, my = middle.y, mz = middle.z;
+    const float near_z = window.near_z, far_z = window.far_z;
+    const float left = window.left, right = window.right, top = window.top, bottom = window.bottom;
+    constexpr float kRounding = 1e-5f;  // of a ball's place, and more than of its radius
+    for (int i = 0; i < count; ++i) {
+        const float px = mx + xx * x[i] + yx * y[i] + zx * z[i],
+                    py = my + xy * x[i] + yy * y[i] + zy * z[i],
+                    pz = mz + xz * x[i] + yz * y[i] + zz * z[i];
+        const float r = radius[i] * reach * (1.0f + 1e-3f) +
+                        kRounding * (std::abs(px) + std::abs(py) + std::abs(pz));
+        const float near = pz - r, far = pz + r;
+        const int is_deep = (far > near_z) & (near <= far_z);
+        // Of a box around the ball: an edge right of the axis lies farthest left at its far side.
+        const auto depth = [&](float edge, bool is_low) {
+            return kOrthographic ? 1.0f : (edge < 0.0f) == is_low ? near : far;
+        };
+        const float x0 = px - r, x1 = px + r, y0 = py - r, y1 = py + r;
+        const int is_inside = (x0 < right * depth(x0, true)) & (x1 > left * depth(x1, false)) &
+                              (y0 < bottom * depth(y0, true)) & (y1 > top * depth(y1, false));
+        const int reaches_eye = kOrthographic ? 0 : !(near > near_z);
+        may_show[i] = is_deep & (is_inside | reaches_eye);
+    }
+}
+
+// Which blocks of a level, from `first` on, may show in the window; no exact test.
+STIPPLE_VECTOR_CLONES void testBlocks(bool orthographic, const Window& window, const Mat3& linear,
+                                      const Vec3& middle, float reach, const SurfelBalls& balls,
+                                      size_t first, int count, int32_t* may_show) {
+    const float *x = balls.x.data() + first, *y = balls.y.data() + first,
+                *z = balls.z.data() + first, *radius = balls.radius.data() + first;
+    orthographic ? testLoop<true>(window, linear, middle, reach, x, y, z, radius, count, may_show)
+                 : testLoop<false>(window, linear, middle, reach, x, y, z, radius, count, may_show);
+}
+
 }  // namespace
 
 bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z_min) {
@@ -99,15 +162,13 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         view.orthographic
             ? scaled_focal
             : scaled_focal / nearest * stretch(view, middle, std::max(middle.z, nearest));
-    // Subpixels between points: each covers 1/K of one.
-    const float wanted = 1.0f / float(std::sqrt(context_.settings.samples));
+    const float wanted = wantedSpacing();
     const int n_levels = int(model.levels.size());
     if (!mesh.triangles.empty() && model.levels.back().spacing * per_metre < kFarShare * wanted)
         return false;
     int l = n_levels - 1;
     while (l > 0 && model.levels[size_t(l)].spacing * per_metre > wanted) --l;
     const SurfelLevel& level = model.levels[size_t(l)];
-    const bool may_be_discs = !context_.sink->wantsSurfels();
     Placed placed{frame,      model, level,
                   mesh_index, l,     scale,
                   kNoFrame,   {},    makeModelEye(frame, model, view.orthographic)};
@@ -120,32 +181,53 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
             int(patchWidthCode(model.finishes[i].patch_width * scale, kFirstMetreExponent));
     }
     const float reach = float(maxLengthScale(frame.camera_from_object.linear));
-    const SubpixelRect& region = context_.sink->region();
-    for (const SurfelBlock& block : level.blocks) {
-        if (coneHides(placed.eye, block) || maskHides(placed.eye, block)) continue;
-        const Vec3 center(frame.camera_from_object.point(DVec3(block.bounds.center())));
-        const DiscSides& sides = block.sides;
-        float radius = 0.5f * glm::length(block.bounds.extent()) * reach;
-        // Each block by its own depth: only what is too near needs discs.
-        const float z = std::max(center.z - radius, view.near_z);
-        const float per_metre_here =
-            scaled_focal * (view.orthographic ? 1.0f : stretch(view, center, z) / z);
-        has_near_ = !may_be_discs && !view.orthographic &&
-                    sides.longest * reach > kEdgeOnShare * z && findNear(placed, block, reach);
-        const bool with_discs = may_be_discs ? sides.largest * per_metre_here > wanted : has_near_;
-        // Discs seen edge on cover no subpixel: their middles do.
-        const bool with_points =
-            !may_be_discs || !with_discs || sides.smallest * per_metre_here < kFewSubpixels;
-        if (with_discs || !may_be_discs) radius += model.discSide() * sides.longest * reach;
-        if (center.z + radius <= view.near_z || center.z - radius > view.far_z) continue;
-        const SubpixelRect rect = ballRect(view, center, radius, region);
-        if (!rect.overlaps(region)) continue;
-        if (context_.sink->hides(rect, std::max(center.z - radius, view.near_z), false)) continue;
-        if (with_discs) drawDiscs(placed, block);
-        block_.is_coarse = !may_be_discs && level.spacing * per_metre_here > wanted;
-        if (with_points) drawPoints(placed, block);
+    const Window window = windowOf(view, context_.sink->region());
+    const Mat3 linear(frame.camera_from_object.linear);
+    std::array<int32_t, kTestedBlocks> may_show;
+    for (size_t first = 0; first < level.blocks.size(); first += kTestedBlocks) {
+        const int n = int(std::min(level.blocks.size() - first, size_t(kTestedBlocks)));
+        testBlocks(view.orthographic, window, linear, middle, reach, level.balls, first, n,
+                   may_show.data());
+        for (int i = 0; i < n; ++i) {
+            if (may_show[size_t(i)]) drawBlock(placed, level.blocks[first + size_t(i)], reach);
+        }
     }
     return true;
+}
+
+void SurfelPoints::drawBlock(const Placed& placed, const SurfelBlock& block, float reach) {
+    if (coneHides(placed.eye, block) || maskHides(placed.eye, block)) return;
+    const View& view = context_.view;
+    const SurfelLevel& level = placed.level;
+    const DiscSides& sides = block.sides;
+    const SubpixelRect& region = context_.sink->region();
+    const Vec3 center(placed.frame.camera_from_object.point(DVec3(block.bounds.center())));
+    const float scaled_focal = placed.length_scale * float(view.focal);
+    const float wanted = wantedSpacing();
+    float radius = 0.5f * glm::length(block.bounds.extent()) * reach;
+    // Each block by its own depth: only what is too near needs discs.
+    const float z = std::max(center.z - radius, view.near_z);
+    const float per_metre =
+        scaled_focal * (view.orthographic ? 1.0f : stretch(view, center, z) / z);
+    const bool may_be_discs = !context_.sink->wantsSurfels();
+    has_near_ = !may_be_discs && !view.orthographic && sides.longest * reach > kEdgeOnShare * z &&
+                findNear(placed, block, reach);
+    const bool with_discs = may_be_discs ? sides.largest * per_metre > wanted : has_near_;
+    // Discs seen edge on cover no subpixel: their middles do.
+    const bool with_points =
+        !may_be_discs || !with_discs || sides.smallest * per_metre < kFewSubpixels;
+    if (with_discs || !may_be_discs) radius += placed.model.discSide() * sides.longest * reach;
+    if (center.z + radius <= view.near_z || center.z - radius > view.far_z) return;
+    const SubpixelRect rect = ballRect(view, center, radius, region);
+    if (!rect.overlaps(region)) return;
+    if (context_.sink->hides(rect, std::max(center.z - radius, view.near_z), false)) return;
+    if (with_discs) drawDiscs(placed, block);
+    block_.is_coarse = !may_be_discs && level.spacing * per_metre > wanted;
+    if (with_points) drawPoints(placed, block);
+}
+
+float SurfelPoints::wantedSpacing() const {
+    return 1.0f / float(std::sqrt(context_.settings.samples));
 }
 
 // Into is_near_. False if there are none.

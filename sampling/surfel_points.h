@@ -21,6 +21,10 @@ public:
 private:
     struct Placed;
 
+    // Subpixels between points: each covers 1/K of one.
+    float wantedSpacing() const;
+    // Unless it is hidden.
+    void drawBlock(const Placed& placed, const SurfelBlock& block, float reach);
     bool findNear(const Placed& placed, const SurfelBlock& block, float reach);
     void drawPoints(const Placed& placed, const SurfelBlock& block);
     void unpackDiscs(const SurfelLevel& level, const SurfelBlock& block);

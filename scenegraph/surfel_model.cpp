@@ -96,8 +96,8 @@ Vec3 unpackNormal16(uint16_t packed) {
 size_t SurfelModel::bytes() const {
     size_t sum = sizeof(SurfelModel) + finishes.size() * sizeof(SurfelFinish);
     for (const SurfelLevel& level : levels) {
-        sum += level.blocks.size() * sizeof(SurfelBlock) + level.radius.size() +
-               level.size() * (2 * sizeof(uint32_t) + sizeof(uint16_t)) +
+        sum += level.blocks.size() * (sizeof(SurfelBlock) + 4 * sizeof(float)) +
+               level.radius.size() + level.size() * (2 * sizeof(uint32_t) + sizeof(uint16_t)) +
                level.shapes.size() * sizeof(SurfelShape) + level.cuts.size() * sizeof(SurfelCut) +
                level.bends.size() * sizeof(SurfelBend);
     }
@@ -385,6 +385,19 @@ void measureBlock(const SurfelLevel& level, SurfelBlock& block) {
     sides.longest = std::max(level.spacing * longest, sides.largest);
 }
 
+SurfelBalls ballsOf(const SurfelModel& model, const SurfelLevel& level) {
+    SurfelBalls balls;
+    const size_t n = level.blocks.size();
+    for (std::vector<float>* part : {&balls.x, &balls.y, &balls.z, &balls.radius}) part->reserve(n);
+    for (const SurfelBlock& block : level.blocks) {
+        const Vec3 p(DVec3(block.bounds.center()) - DVec3(model.bounds.center()));
+        balls.x.push_back(p.x), balls.y.push_back(p.y), balls.z.push_back(p.z);
+        balls.radius.push_back(0.5f * glm::length(block.bounds.extent()) +
+                               model.discSide() * block.sides.longest);
+    }
+    return balls;
+}
+
 // Of its discs as polygons.
 Box3 drawnBounds(const SurfelModel& model, const SurfelLevel& level, const SurfelBlock& block) {
     Box3 bounds = block.bounds;
@@ -408,6 +421,7 @@ void measureDiscs(SurfelModel& model) {
     model.drawn_bounds = model.bounds;
     for (SurfelLevel& level : model.levels) {
         for (SurfelBlock& block : level.blocks) measureBlock(level, block);
+        level.balls = ballsOf(model, level);
     }
     // Coarser levels are drawn where their discs would be no larger than a subpixel.
     const SurfelLevel& finest = model.levels[0];

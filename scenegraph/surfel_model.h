@@ -44,6 +44,12 @@ struct SurfelBlock {
     DiscSides sides;  // not in files: measureDiscs()
 };
 
+// Of blocks, structure of arrays: balls around all that is drawn of one. Object space, m, relative
+// to the middle of SurfelModel::bounds.
+struct SurfelBalls {
+    std::vector<float> x, y, z, radius;
+};
+
 // Positions within a block: 11, 11 and 10 bits.
 inline constexpr int kPositionBits[3] = {11, 11, 10};
 inline constexpr int kPositionShift[3] = {0, 11, 22};
@@ -93,6 +99,7 @@ struct SurfelLevel {
     std::vector<SurfelShape> shapes;
     std::vector<SurfelCut> cuts;
     std::vector<SurfelBend> bends;  // of shapes; empty: all are flat
+    SurfelBalls balls;              // one a block; not in files: measureDiscs()
 
     size_t size() const { return position.size(); }
     static Vec3 step(const SurfelBlock& block) {
