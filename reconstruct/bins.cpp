@@ -85,7 +85,7 @@ public:
         filter_.apply(shaded, inner_, [&](int x, int y, PixelSums& sums) {
             channels_.add(lookup, means_.fronts(), x, y, sums);
             means_.split().addCount(x, y, sums);
-            context_.picture->write(x, y, sums);
+            context_.picture->write(x, y, sums, sky_);
         });
     }
     TileCounters counters() const override { return means_.split().counters(); }
@@ -209,6 +209,7 @@ private:
 
     const ReconstructionContext context_;
     FrontMeans means_;
+    SkyRow sky_;
     PixelFilter filter_;
     const FootprintTable footprints_;
     LayerBins layers_;

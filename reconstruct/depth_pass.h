@@ -33,6 +33,7 @@ public:
     // How many subpixels beyond the one it lies in a point may cover.
     int reach(bool narrow) const { return narrow && !is_splat_ ? 0 : side_ / 2; }
     const TileCounters& counters() const { return counters_; }
+    bool wantsCounts() const { return wants_counts_; }
     // Kept points of a pixel of the tile, if asked for.
     void addCount(int px, int py, PixelSums& sums) const;
 

@@ -122,7 +122,7 @@ public:
         filter_.apply(shaded_, inner_, [&](int x, int y, PixelSums& sums) {
             channels_.add(lookup, hits_, x, y, sums);
             split_.addCount(x, y, sums);
-            context_.picture->write(x, y, sums);
+            context_.picture->write(x, y, sums, sky_);
         });
     }
     TileCounters counters() const override { return split_.counters(); }
@@ -298,6 +298,7 @@ private:
 
     const ReconstructionContext context_;
     SplitPass split_;
+    SkyRow sky_;
     PixelFilter filter_;
     const FrontSlack slack_;
     const float prefilter_;  // variance, subpixels squared

@@ -111,6 +111,12 @@ public:
         const int s = context_.view.subpixels;
         for (int py = inner_.y0 / s; py < inner_.y1 / s; ++py) {
             for (int px = inner_.x0 / s; px < inner_.x1 / s; ++px) {
+                const int n_empty = countEmpty(px, py);
+                if (n_empty > 0) {
+                    context_.picture->writeNothing(px, py, n_empty, float(s * s), sky_);
+                    px += n_empty - 1;
+                    continue;
+                }
                 PixelSums sums;
                 shader_.showPixel(lookup, tile_, px, py, [&](int, int, uint64_t key) {
                     if (DepthTile::numberOf(key) == kNoNumber) {
@@ -120,19 +126,36 @@ public:
                     }
                 });
                 depth_pass_.addCount(px, py, sums);
-                context_.picture->write(px, py, sums);
+                context_.picture->write(px, py, sums, sky_);
             }
         }
     }
     TileCounters counters() const override { return depth_pass_.counters(); }
 
 private:
+    // Pixels from this one on along a row that show nothing, and have no points to be counted.
+    int countEmpty(int px, int py) const {
+        const int s = context_.view.subpixels, last = inner_.x1 / s;
+        if (depth_pass_.wantsCounts()) return 0;
+        int n = 0;
+        for (; px + n < last; ++n) {
+            for (int y = py * s; y < (py + 1) * s; ++y) {
+                const uint64_t* row = tile_.row(y);
+                for (int x = (px + n) * s; x < (px + n + 1) * s; ++x) {
+                    if (DepthTile::numberOf(row[x]) != kNoNumber) return n;
+                }
+            }
+        }
+        return n;
+    }
+
     const ReconstructionContext context_;
     DepthPass depth_pass_;
     const bool is_splat_;
     SubpixelRect inner_;
     DepthTile tile_;
     std::vector<uint64_t> scratch_;
+    SkyRow sky_;
     SubpixelShader shader_{context_};
 };
 

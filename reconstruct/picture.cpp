@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <reconstruct/picture.h>
 
+#include <core/vector_clones.h>
 #include <reconstruct/shade.h>
 
 #include <cstdio>
@@ -43,7 +44,14 @@ Picture::Picture(const View& view, const Lighting& lighting, const std::vector<s
       albedo_(image_.channelIndex("albedo.R")),
       object_(image_.channelIndex("object")),
       coverage_(image_.channelIndex("coverage")),
-      count_(image_.channelIndex("count")) {}
+      count_(image_.channelIndex("count")) {
+    ray_x_.reserve(size_t(view.width));
+    for (int x = 0; x < view.width; ++x) {
+        Vec3 origin, direction;
+        view.ray((float(x) + 0.5f) * float(view.subpixels), 0.0f, origin, direction);
+        ray_x_.push_back(direction.x);
+    }
+}
 
 std::string Picture::watchedPixel() const {
     const PixelSums& s = watched_;
@@ -60,16 +68,83 @@ std::string Picture::watchedPixel() const {
     return line;
 }
 
-void Picture::write(int x, int y, const PixelSums& s) {
+namespace {
+
+// skyRadiance() of a sky without an environment in the directions (x[i], y, 1).
+STIPPLE_VECTOR_CLONES void gradientSky(const Sky& sky, const Mat3& world_from_camera,
+                                       const float* __restrict x, float y, int count,
+                                       float* __restrict red, float* __restrict green,
+                                       float* __restrict blue) {
+    // Plain locals, or the compiler will not vectorize.
+    const Mat3& m = world_from_camera;
+    const float xx = m[0].x, xy = m[0].y, xz = m[0].z, zx = m[2].x, zy = m[2].y, zz = m[2].z;
+    const float yx = m[1].x * y, yy = m[1].y * y, yz = m[1].z * y;
+    const Vec3 h = sky.horizon, g = sky.ground, z = sky.zenith;
+    for (int i = 0; i < count; ++i) {
+        const float px = xx * x[i] + yx + zx, py = xy * x[i] + yy + zy, pz = xz * x[i] + yz + zz;
+        const float up = py * (1.0f / std::sqrt(px * px + py * py + pz * pz));
+        const bool is_below = up < 0.0f;
+        const float below = std::min(1.0f, -up * 5.7f), above = std::sqrt(std::max(up, 0.0f));
+        const float t = is_below ? below : above;
+        red[i] = h.x * (1.0f - t) + (is_below ? g.x : z.x) * t;
+        green[i] = h.y * (1.0f - t) + (is_below ? g.y : z.y) * t;
+        blue[i] = h.z * (1.0f - t) + (is_below ? g.z : z.z) * t;
+    }
+}
+
+}  // namespace
+
+// From pixel x on.
+void Picture::findSky(int x, int y, SkyRow& sky) const {
+    sky.x = x, sky.y = y;
+    sky.count = std::min(SkyRow::kPixels, view_.width - x);
+    Vec3 origin, direction;
+    view_.ray(0.0f, (float(y) + 0.5f) * float(view_.subpixels), origin, direction);
+    if (!lighting_.sky.environment) {
+        gradientSky(lighting_.sky, world_from_camera_, ray_x_.data() + x, direction.y, sky.count,
+                    sky.red.data(), sky.green.data(), sky.blue.data());
+        return;
+    }
+    for (int i = 0; i < sky.count; ++i) {
+        direction.x = ray_x_[size_t(x + i)];
+        const Vec3 radiance =
+            skyRadiance(lighting_.sky, glm::normalize(world_from_camera_ * direction));
+        sky.red[size_t(i)] = radiance.x;
+        sky.green[size_t(i)] = radiance.y;
+        sky.blue[size_t(i)] = radiance.z;
+    }
+}
+
+void Picture::writeNothing(int x, int y, int count, float samples, SkyRow& sky) {
+    if (transparent_ || image_.channelCount() > 4 || y == watched_y_) {
+        PixelSums nothing;
+        nothing.samples = samples;
+        for (int i = 0; i < count; ++i) write(x + i, y, nothing, sky);
+        return;
+    }
+    for (int i = 0; i < count;) {
+        if (!sky.has(x + i, y)) findSky(x + i, y, sky);
+        const int first = x + i - sky.x, n = std::min(count - i, sky.count - first);
+        float* out = image_.pixel(x + i, y);
+        for (int k = 0; k < n; ++k, out += 4) {
+            const size_t from = size_t(first + k);
+            out[0] = sky.red[from] * exposure_;
+            out[1] = sky.green[from] * exposure_;
+            out[2] = sky.blue[from] * exposure_;
+            out[3] = 1.0f;
+        }
+        i += n;
+    }
+}
+
+void Picture::write(int x, int y, const PixelSums& s, SkyRow& sky) {
     if (isWatched(x, y)) watched_ = s;
     const float coverage = s.samples > 0.0f ? s.covered / s.samples : 0.0f;
     Vec3 color = s.samples > 0.0f ? s.radiance / s.samples : Vec3(0.0f);
     if (!transparent_ && coverage < 1.0f) {
-        Vec3 origin, direction;
-        view_.ray((float(x) + 0.5f) * float(view_.subpixels),
-                  (float(y) + 0.5f) * float(view_.subpixels), origin, direction);
-        const Vec3 world = glm::normalize(world_from_camera_ * direction);
-        color += skyRadiance(lighting_.sky, world) * (1.0f - coverage);
+        if (!sky.has(x, y)) findSky(x, y, sky);
+        const size_t i = size_t(x - sky.x);
+        color += Vec3(sky.red[i], sky.green[i], sky.blue[i]) * (1.0f - coverage);
     }
     float* out = image_.pixel(x, y);
     for (int i = 0; i < 3; ++i) out[i] = color[i] * exposure_;

@@ -8,6 +8,7 @@
 #include <core/light.h>
 #include <core/surface.h>
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,16 @@ struct PixelSums {
     void addNothing() { samples += 1.0f; }
 };
 
+// The sky behind some pixels of a row: what a thread keeps from one pixel of a picture to the next,
+// since many cost little more than one.
+struct SkyRow {
+    static constexpr int kPixels = 32;
+    int x = 0, y = -1, count = 0;  // the first pixel; none yet
+    alignas(64) std::array<float, kPixels> red, green, blue;
+
+    bool has(int at_x, int at_y) const { return at_y == y && at_x >= x && at_x < x + count; }
+};
+
 // Lays out channels and finishes pixels: R, G, B, A, then the AOVs in the order asked for.
 class Picture {
 public:
@@ -48,8 +59,11 @@ public:
     // kInvalidArgument for another name.
     Picture(const View& view, const Lighting& lighting, const std::vector<std::string>& aovs,
             bool transparent);
-    // Background where samples saw nothing; exposure applied. Pixels may be written in parallel.
-    void write(int x, int y, const PixelSums& sums);
+    // Background where samples saw nothing; exposure applied. Pixels may be written in parallel,
+    // each thread with a SkyRow of its own; fast where x goes up along a row.
+    void write(int x, int y, const PixelSums& sums, SkyRow& sky);
+    // The same for `count` pixels from x on where all of `samples` saw nothing.
+    void writeNothing(int x, int y, int count, float samples, SkyRow& sky);
     Image& image() { return image_; }
     // Keeps the sums of one pixel for the description below.
     void watch(int x, int y) { watched_x_ = x, watched_y_ = y; }
@@ -58,7 +72,10 @@ public:
     std::string watchedPixel() const;
 
 private:
+    void findSky(int x, int y, SkyRow& sky) const;
+
     View view_;
+    std::vector<float> ray_x_;  // of rays through the middles of pixels of a column, camera space
     Mat3 world_from_camera_;
     Lighting lighting_;
     bool transparent_;

@@ -77,7 +77,7 @@ public:
         filter_.apply(shaded_, inner_, [&](int x, int y, PixelSums& sums) {
             channels_.add(lookup, hits_, x, y, sums);
             split_.addCount(x, y, sums);
-            context_.picture->write(x, y, sums);
+            context_.picture->write(x, y, sums, sky_);
         });
     }
     TileCounters counters() const override { return split_.counters(); }
@@ -146,6 +146,7 @@ private:
     const ReconstructionContext context_;
     LevelDepths levels_;
     SplitPass split_;
+    SkyRow sky_;
     PixelFilter filter_;
     SubpixelShader shader_{context_};
     SurfaceChannels channels_{context_};

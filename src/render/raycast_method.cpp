@@ -245,9 +245,10 @@ void drawRays(const RayCaster& caster, const View& view, const std::vector<Mater
             }
         }
         castAndShade(batch, shadows, ambient);
+        SkyRow sky;
         for (int y = y0; y < y1; ++y) {
             for (int x = x0; x < x1; ++x)
-                picture.write(x, y, sums[size_t(y - y0) * kTilePixels + size_t(x - x0)]);
+                picture.write(x, y, sums[size_t(y - y0) * kTilePixels + size_t(x - x0)], sky);
         }
         const size_t n = ++done;
         if (request.progress && n % 64 == 0) {
