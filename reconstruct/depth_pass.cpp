@@ -5,6 +5,8 @@
 #include <core/vector_clones.h>
 #include <reconstruct/tile_triangles.h>
 
+#include <cstring>
+
 namespace stipple {
 
 DepthPass::DepthPass(const ReconstructionContext& context, int splat_subpixels)
@@ -46,7 +48,9 @@ struct Window {
     int stride;
 };
 
-template <bool kOrthographic>
+// A whole block, however many points are in it: a number of steps that the compiler knows. kAlike:
+// all have the same footprint, of no more than the subpixel they lie in.
+template <bool kOrthographic, bool kAlike>
 inline __attribute__((always_inline)) void placeLoop(const Window& window, const PointBlock& block,
                                                      const FootprintTable& footprints,
                                                      Placed& placed) {
@@ -67,13 +71,14 @@ inline __attribute__((always_inline)) void placeLoop(const Window& window, const
     int32_t* __restrict offset = placed.offset;
     int32_t* __restrict covers = placed.covers;
     alignas(64) float half_side[kBlockPoints], wide_share[kBlockPoints];
-    const int count = block.count, n = (count + 15) & ~15;
-    for (int i = 0; i < n; ++i) {
+    const int count = block.count;
+    for (int i = 0; !kAlike && i < kBlockPoints; ++i) {
         half_side[i] = footprints.half_side[block.width[i]];
         wide_share[i] = footprints.wide_share[block.width[i]];
     }
+    const float alike_half_side = footprints.half_side[block.width[0]];
     int kept = 0;
-    for (int i = 0; i < n; ++i) {
+    for (int i = 0; i < kBlockPoints; ++i) {
         const float scale = kOrthographic ? focal : focal / z[i];
         const float px = center_x + x[i] * scale, py = center_y + y[i] * scale;
         const int is_there = keep[i] & (i < count);
@@ -84,14 +89,19 @@ inline __attribute__((always_inline)) void placeLoop(const Window& window, const
         const int ix = int(std::min(right, std::max(left, px))),
                   iy = int(std::min(bottom, std::max(top, py)));
         const float dx = std::abs(px - float(ix) - 0.5f), dy = std::abs(py - float(iy) - 0.5f);
-        const int is_near = (dx <= half_side[i]) & (dy <= half_side[i]);
+        const float half = kAlike ? alike_half_side : half_side[i];
+        const int is_near = (dx <= half) & (dy <= half);
+        sx[i] = px;
+        sy[i] = py;
+        offset[i] = (iy - y0) * stride + (ix - x0);
+        if (kAlike) {
+            covers[i] = is_in_tile * is_near;
+            continue;
+        }
         // The same choice in every tile that sees the point: from its coordinates.
         const uint32_t bits =
             mixBits32(std::bit_cast<uint32_t>(x[i]) * 0x9e3779b9u ^ std::bit_cast<uint32_t>(y[i]));
         const int is_wide = float(int(bits >> 8)) * 0x1p-24f < wide_share[i];
-        sx[i] = px;
-        sy[i] = py;
-        offset[i] = (iy - y0) * stride + (ix - x0);
         covers[i] = is_in_tile * (is_wide * kWide | is_near);
     }
     placed.kept = kept;
@@ -100,8 +110,17 @@ inline __attribute__((always_inline)) void placeLoop(const Window& window, const
 STIPPLE_VECTOR_CLONES void placePoints(bool orthographic, const Window& window,
                                        const PointBlock& block, const FootprintTable& footprints,
                                        Placed& placed) {
-    orthographic ? placeLoop<true>(window, block, footprints, placed)
-                 : placeLoop<false>(window, block, footprints, placed);
+    // As those of a prebuilt model are.
+    const bool is_alike =
+        std::memcmp(block.width, block.width + 1, size_t(std::max(block.count, 1) - 1)) == 0 &&
+        !(footprints.wide_share[block.width[0]] > 0.0f);
+    if (is_alike) {
+        orthographic ? placeLoop<true, true>(window, block, footprints, placed)
+                     : placeLoop<false, true>(window, block, footprints, placed);
+    } else {
+        orthographic ? placeLoop<true, false>(window, block, footprints, placed)
+                     : placeLoop<false, false>(window, block, footprints, placed);
+    }
 }
 
 }  // namespace

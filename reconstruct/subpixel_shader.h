@@ -119,6 +119,12 @@ template <class Take>
 void SubpixelShader::showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
                                const Take& take) {
     const int s = context_.view.subpixels;
+    if (s == 1) {
+        const uint64_t key = tile.row(py)[px];
+        if (DepthTile::numberOf(key) != kNoNumber) show(lookup, key, px, py);
+        take(px, py, key);
+        return;
+    }
     Cell cell;
     for (int top = py * s; top < (py + 1) * s; top += kSharedCells) {
         for (int left = px * s; left < (px + 1) * s; left += kSharedCells) {

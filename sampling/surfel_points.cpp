@@ -269,18 +269,21 @@ struct Warp {
     float z_near, z_far;
 };
 
-STIPPLE_VECTOR_CLONES void warpPoints(const Warp& w, const uint32_t* __restrict packed, int count,
+// A whole block, however many points are in it: a number of steps that the compiler knows.
+STIPPLE_VECTOR_CLONES void warpPoints(const Warp& w,
+                                      const std::array<uint32_t, kBlockPoints>& positions,
                                       uint32_t first_number, PointBlock& out) {
     // Plain locals and restricted pointers, or the compiler will not vectorize.
     const float xx = w.x.x, xy = w.x.y, xz = w.x.z, yx = w.y.x, yy = w.y.y, yz = w.y.z;
     const float zx = w.z.x, zy = w.z.y, zz = w.z.z, bx = w.base.x, by = w.base.y, bz = w.base.z;
     const float z_near = w.z_near, z_far = w.z_far;
+    const uint32_t* __restrict packed = positions.data();
     float* __restrict out_x = out.x;
     float* __restrict out_y = out.y;
     float* __restrict out_z = out.z;
     uint32_t* __restrict number = out.number;
     uint8_t* __restrict keep = out.keep;
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < kBlockPoints; ++i) {
         const float p = float(int(positionPart(packed[i], 0))),
                     q = float(int(positionPart(packed[i], 1))),
                     r = float(int(positionPart(packed[i], 2)));
@@ -309,7 +312,9 @@ void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
     PointBlock& out = block_;
     out.count = n;
     out.is_prebuilt = true;
-    warpPoints(warp, placed.level.position.data() + b.first, n, addRun(placed, b.first, 0), out);
+    std::array<uint32_t, kBlockPoints> positions = {};
+    std::copy_n(placed.level.position.data() + b.first, n, positions.data());
+    warpPoints(warp, positions, addRun(placed, b.first, 0), out);
     for (int i = 0; has_near_ && i < n; ++i) out.keep[i] &= uint8_t(!is_near_[size_t(i)]);
     const bool with_shapes = context_.sink->wantsSurfels();
     if (with_shapes || !placed.model.leaves_no_holes) {
