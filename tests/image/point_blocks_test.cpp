@@ -244,5 +244,38 @@ TEST(PointBlocks, sameBitsForAnyThreadsBuiltAndDrawn) {
     EXPECT_EQ(x.data, y.data);
 }
 
+// Blocks that lie elsewhere are left out of each tile: none that shows may be.
+TEST(PointBlocks, sameBitsForAnyTiles) {
+    ThreadPool pool(2);
+    const Pair pair = makePair(tree(), 48, pool);
+    const DBox3 bounds = sceneBounds(pair.source);
+    const DVec3 center = 0.5 * (bounds.min + bounds.max);
+    std::vector<Camera> cameras = {cameraTo(pair.source, maskDirectionOf(3), 48, 100, 1.5),
+                                   cameraTo(pair.source, maskDirectionOf(60), 48, 100, 9.0)};
+    // From within, and from aside without perspective.
+    cameras.push_back(lookAt(center, center + DVec3(0.3, -0.2, 1.0)));
+    cameras.back().fov_y = 1.6;
+    cameras.push_back(cameras[0]);
+    cameras.back().orthographic = true;
+    cameras.back().height = 0.3 * (bounds.max.y - bounds.min.y);
+    for (const Reconstruct method : {Reconstruct::kPerPixel, Reconstruct::kEwa}) {
+        for (const Camera& camera : cameras) {
+            Renderer renderer(pair.model, pool);
+            FrameRequest request;
+            request.camera = camera;
+            request.settings.width = request.settings.height = 100;
+            request.settings.subpixels = 1;
+            request.settings.reconstruct = method;
+            request.settings.tile_size = 1024;
+            request.settings.culling = false;
+            const Image whole = renderer.render(request).image;
+            for (const int tile : {8, 31}) {
+                request.settings.tile_size = tile;
+                EXPECT_EQ(whole.data, renderer.render(request).image.data) << tile;
+            }
+        }
+    }
+}
+
 }  // namespace
 }  // namespace stipple

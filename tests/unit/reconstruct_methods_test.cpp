@@ -273,6 +273,48 @@ TEST(ReconstructMethods, blocksThatShowNothingAreGivenBack) {
     }
 }
 
+// A block whose points all cover the same takes a way of its own.
+TEST(ReconstructMethods, pointsThatCoverAlikeAreDrawnLikeOthers) {
+    for (const bool orthographic : {true, false}) {
+        for (const double samples : {0.5, 1.0, 4.0}) {
+            TestFrame frame;
+            frame.camera.orthographic = orthographic;
+            frame.settings.samples = samples;
+            Picture picture(frame.view(), frame.lighting, {}, false);
+            ReconstructionContext context;
+            context.view = frame.view();
+            context.settings = frame.settings;
+            context.picture = &picture;
+            const SubpixelRect all{0, 0, context.view.subWidth(), context.view.subHeight()};
+            Rng rng{5};
+            for (const int count : {1, 17, 46, kBlockPoints - 1}) {
+                PointBlock block = blockAt(0.0f, 0.0f, 100.0f, 1.0f);
+                block.count = count;
+                for (int i = 0; i < count; ++i) {
+                    block.x[i] = float(rng.uniform(-35, 35)),
+                    block.y[i] = float(rng.uniform(-25, 25));
+                    block.z[i] = orthographic ? 50.0f : float(rng.uniform(20, 60));
+                    block.keep[i] = uint8_t(i % 5 != 0);
+                    block.width[i] = kNoPatch;
+                }
+                // With one more that lies behind the eye and is not kept.
+                PointBlock mixed = block;
+                mixed.count = count + 1;
+                mixed.x[count] = mixed.y[count] = 0.0f, mixed.z[count] = -1.0f;
+                mixed.keep[count] = 0;
+                mixed.width[count] = kSurfaceCode;
+                DepthPass pass(context, 0), other(context, 0);
+                DepthTile tile, other_tile;
+                tile.reset(all, nullptr, 0), other_tile.reset(all, nullptr, 0);
+                pass.begin(all), other.begin(all);
+                EXPECT_TRUE(pass.take(block, tile) == other.take(mixed, other_tile));
+                EXPECT_EQ(tile.keys(), other_tile.keys());
+                EXPECT_EQ(pass.counters().points_kept, other.counters().points_kept);
+            }
+        }
+    }
+}
+
 TEST(ReconstructMethods, onePointAtTwoDepthsIsSeenAtBoth) {
     // Looked up once, shaded where it is seen: haze tells the depth.
     class Lookup : public SampleLookup {

@@ -169,6 +169,34 @@ TEST(SurfelModel, conesHideWhatFacesAway) {
     EXPECT_GT(hidden, tried / 5);
 }
 
+// Whatever lies outside of a block's ball is left out before it is looked at.
+TEST(SurfelModel, ballsHoldWhatIsDrawnOfBlocks) {
+    for (const SurfelDiscs discs :
+         {SurfelDiscs::kAlike, SurfelDiscs::kRadii, SurfelDiscs::kShapes}) {
+        SurfelModel model = ballModel(discs);
+        measureDiscs(model);
+        for (const SurfelLevel& level : model.levels) {
+            const SurfelBalls& balls = level.balls;
+            ASSERT_EQ(balls.x.size(), level.blocks.size());
+            for (size_t b = 0; b < level.blocks.size(); ++b) {
+                const SurfelBlock& block = level.blocks[b];
+                const Vec3 middle =
+                    model.bounds.center() + Vec3(balls.x[b], balls.y[b], balls.z[b]);
+                std::array<Vec3, kMostDiscCorners> corners;
+                for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+                    const Surfel s = unpackSurfel(level, block, i);
+                    const int n = discPolygon(
+                        level, s, model.discSide() * level.spacing * s.radius_share, corners);
+                    for (int c = 0; c < n; ++c) {
+                        EXPECT_LE(glm::distance(middle, s.position + corners[size_t(c)]),
+                                  balls.radius[b] * 1.0001f);
+                    }
+                }
+            }
+        }
+    }
+}
+
 TEST(SurfelModel, maskDirectionsCoverTheSphereEvenly) {
     std::vector<int> hits(kMaskDirections, 0);
     Rng rng{5};
