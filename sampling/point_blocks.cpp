@@ -176,12 +176,18 @@ public:
     }
 
     // Which mask directions see each block.
-    void findMasks(float pixel, SurfelLevel& level) {
+    void findMasks(const std::vector<SurfelFinish>& finishes, float pixel, SurfelLevel& level) {
         constexpr int kViews = 7;  // within a direction's part of the sphere and a little beyond
-        std::vector<Vec3> positions(level.size());
+        struct Seen {
+            Vec3 position, normal;
+            bool is_double_sided;
+        };
+        std::vector<Seen> points(level.size());
         for (const SurfelBlock& b : level.blocks) {
-            for (uint32_t i = b.first; i < b.first + b.count; ++i)
-                positions[i] = unpackSurfel(level, b, i).position;
+            for (uint32_t i = b.first; i < b.first + b.count; ++i) {
+                const Surfel s = unpackSurfel(level, b, i);
+                points[i] = {s.position, s.normal, finishes[s.finish].material.double_sided};
+            }
         }
         std::vector<std::vector<uint8_t>> seen_from(kMaskDirections);
         pool_.forEach(kMaskDirections, [&](size_t m, int) {
@@ -192,14 +198,19 @@ public:
                 const Vec3 middle = maskDirectionOf(int(m));
                 const Mat3 across = glm::transpose(viewFromObject(middle, float(v) * 1.0472f));
                 const Vec3 off = v == 0 ? Vec3(0.0f) : across[0] * 0.2f;
-                Picture picture(viewFromObject(glm::normalize(middle + off), 0.0f), pixel, radius_,
-                                Vec2(0.0f));
-                for (const Vec3& p : positions) picture.draw(p);
+                const Vec3 to_viewer = glm::normalize(middle + off);
+                Picture picture(viewFromObject(to_viewer, 0.0f), pixel, radius_, Vec2(0.0f));
+                // Backs are left out when a model is drawn: they hide nothing. Where a surface has
+                // an opening one sees through them what lies beyond.
+                for (const Seen& p : points) {
+                    if (p.is_double_sided || glm::dot(p.normal, to_viewer) > 0.0f)
+                        picture.draw(p.position);
+                }
                 for (size_t k = 0; k < level.blocks.size(); ++k) {
                     const SurfelBlock& b = level.blocks[k];
                     size_t ignored;
                     for (uint32_t i = b.first; i < b.first + b.count && !seen[k]; ++i)
-                        seen[k] = picture.shows(positions[i], ignored);
+                        seen[k] = picture.shows(points[i].position, ignored);
                 }
             }
         });
@@ -503,7 +514,7 @@ SurfelModel buildPointBlocks(const RayCaster& caster, const std::vector<Material
             surfels.push_back({s.position, s.normal, s.albedo, index_of.at(s.finish_key), 1.0f});
         SurfelLevel level =
             packSurfels(std::move(surfels), model.finishes, pixel, SurfelDiscs::kAlike);
-        builder.findMasks(pixel, level);
+        builder.findMasks(model.finishes, pixel, level);
         // From about the centre to where the source is.
         for (SurfelBlock& block : level.blocks) {
             block.bounds.min += Vec3(center);

@@ -244,6 +244,38 @@ TEST(PointBlocks, sameBitsForAnyThreadsBuiltAndDrawn) {
     EXPECT_EQ(x.data, y.data);
 }
 
+// What is seen through the back of a single-sided surface, as through a scan's openings.
+TEST(PointBlocks, backsHideNothingBehindThem) {
+    ThreadPool pool(2);
+    GeneratedMesh made = torus();
+    Mesh plates;
+    for (const float z : {-1.0f, 1.0f}) {
+        // The farther one faces the viewer on the side of +z, the nearer one faces away.
+        const uint32_t first = uint32_t(plates.positions.size());
+        for (const Vec2& p : {Vec2(-1, -1), Vec2(1, -1), Vec2(1, 1), Vec2(-1, 1)}) {
+            plates.positions.emplace_back(p, z);
+            plates.normals.emplace_back(0.0f, 0.0f, -z);
+        }
+        const uint32_t b = z < 0.0f ? 1u : 2u, c = z < 0.0f ? 2u : 1u;
+        plates.triangles.emplace_back(first, first + b, first + c);
+        plates.triangles.emplace_back(first, first + b + 1u, first + c + 1u);
+    }
+    plates.triangle_material.assign(plates.triangles.size(), 0);
+    made.mesh = std::move(plates);
+    const Pair pair = makePair(std::move(made), 64, pool);
+    ASSERT_FALSE(pair.source.materials[0].double_sided);
+    const Camera camera = cameraTo(pair.source, Vec3(0.0f, 0.0f, 1.0f), 64, 64, 1.0);
+    const Image rays = draw(pair.source, camera, 64, Method::kRaycast, 16, pool, 1),
+                points = draw(pair.model, camera, 64, Method::kPoints, 1, pool, 1);
+    double covered = 0.0;
+    const int coverage = rays.channelIndex("coverage");
+    for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) covered += double(rays.pixel(x, y)[coverage]);
+    }
+    EXPECT_GT(covered, 500.0);
+    EXPECT_LE(compareImages(points, rays, pool).holes->count, 4u);
+}
+
 // Blocks that lie elsewhere are left out of each tile: none that shows may be.
 TEST(PointBlocks, sameBitsForAnyTiles) {
     ThreadPool pool(2);
