@@ -77,7 +77,8 @@ private:
 // Key of point i of a block where it covers a subpixel at that depth: says whether the point lies
 // on a surface whose holes are to be closed.
 inline uint64_t pointKey(const PointBlock& block, int i, float depth) {
-    const uint32_t surface = block.width[i] >= kSurfaceCode ? kSurfaceBit : 0;
+    const bool is_on_surface = block.is_on_surface || block.width[i] >= kSurfaceCode;
+    const uint32_t surface = is_on_surface ? kSurfaceBit : 0;
     return DepthTile::pack(depth, block.number[i] | surface);
 }
 

@@ -317,12 +317,16 @@ void SurfelPoints::drawPoints(const Placed& placed, const SurfelBlock& b) {
     warpPoints(warp, positions, addRun(placed, b.first, 0), out);
     for (int i = 0; has_near_ && i < n; ++i) out.keep[i] &= uint8_t(!is_near_[size_t(i)]);
     const bool with_shapes = context_.sink->wantsSurfels();
+    out.is_on_surface = false;
     if (with_shapes || !placed.model.leaves_no_holes) {
         addWidths(placed, b);
         if (with_shapes) addShapes(placed, b);
     } else {
-        // There are enough of them: none need be wider than its subpixel.
+        // There are enough of them: none need be wider than its subpixel. Where one has none after
+        // all, those around it close it.
         std::fill(out.width, out.width + n, kNoPatch);
+        out.is_on_surface = b.narrowest_patch * placed.length_scale * float(view.focal) >=
+                            kSurfaceWidth * (view.orthographic ? 1.0f : warp.base.z);
     }
     if (!context_.sink->take(out)) context_.runs.pop_back();
 }

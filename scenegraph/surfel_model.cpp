@@ -367,7 +367,12 @@ int discPolygon(const SurfelLevel& level, const Surfel& s, float side,
 
 namespace {
 
-void measureBlock(const SurfelLevel& level, SurfelBlock& block) {
+void measureBlock(const SurfelModel& model, const SurfelLevel& level, SurfelBlock& block) {
+    block.narrowest_patch = kInfinity;
+    for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+        const SurfelFinish& finish = model.finishes[level.albedo_finish[i] >> 24];
+        block.narrowest_patch = std::min(block.narrowest_patch, finish.patch_width);
+    }
     DiscSides& sides = block.sides;
     sides.smallest = sides.largest = sides.longest = level.spacing;
     if (level.radius.empty()) return;
@@ -420,7 +425,7 @@ Box3 drawnBounds(const SurfelModel& model, const SurfelLevel& level, const Surfe
 void measureDiscs(SurfelModel& model) {
     model.drawn_bounds = model.bounds;
     for (SurfelLevel& level : model.levels) {
-        for (SurfelBlock& block : level.blocks) measureBlock(level, block);
+        for (SurfelBlock& block : level.blocks) measureBlock(model, level, block);
         level.balls = ballsOf(model, level);
     }
     // Coarser levels are drawn where their discs would be no larger than a subpixel.

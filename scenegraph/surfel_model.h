@@ -41,7 +41,9 @@ struct SurfelBlock {
     // -sine * |x - apex|. sine above 1: no such place.
     Vec3 cone_apex = Vec3(0), cone_axis = Vec3(0, 0, 1);
     float cone_sine = 2.0f;
-    DiscSides sides;  // not in files: measureDiscs()
+    // Not in files: measureDiscs().
+    DiscSides sides;
+    float narrowest_patch = 0.0f;  // of its surfels' finishes, m
 };
 
 // Of blocks, structure of arrays: balls around all that is drawn of one. Object space, m, relative

@@ -121,6 +121,9 @@ struct PointBlock {
     // Prebuilt and fewer than the view asks for: for sinks that want surfels they are their discs,
     // however narrow the patch.
     bool is_coarse = false;
+    // Prebuilt, each covers no more than the subpixel it lies in (kNoPatch), and all lie on patches
+    // that are as wide as kSurfaceWidth: holes between them are closed.
+    bool is_on_surface = false;
     // One a point, for sinks that want surfels; nullptr: all are circles.
     const DiscShape* shapes = nullptr;
 };
