@@ -419,8 +419,13 @@ private:
         for (const Sample& s : chosen) grid.add(s.position, s.normal);
         std::vector<Sample> seen;
         std::vector<uint32_t> ignored;
-        for (int d = 0; d < kMaskDirections; ++d) {
-            const Vec3 to_viewer = maskDirectionOf(d);
+        constexpr int kDirections = 2 * kMaskDirections;
+        for (int d = 0; d < kDirections; ++d) {
+            // Once more from between them.
+            const Mat3 turn = viewFromObject(glm::normalize(Vec3(1, 2, 3)), 0.35f);
+            const Vec3 to_viewer = d < kMaskDirections
+                                       ? maskDirectionOf(d)
+                                       : turn * maskDirectionOf(d - kMaskDirections);
             seen.clear(), ignored.clear();
             sampleView(to_viewer, pixel, seen, ignored);
             constexpr size_t kChunk = 1024;
@@ -445,7 +450,7 @@ private:
                     chosen.push_back(s);
                 }
             }
-            progress(0.75 + 0.25 * double(d + 1) / kMaskDirections);
+            progress(0.75 + 0.25 * double(d + 1) / kDirections);
         }
     }
 
