@@ -375,7 +375,7 @@ void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
             glm::normalize(placed.frame.camera_from_normal *
                            (are_discs ? planes_[size_t(i)] : unpackNormal16(level.normal[k])));
         out.normal_x[i] = normal.x, out.normal_y[i] = normal.y, out.normal_z[i] = normal.z;
-        const float share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[k]);
+        const float share = level.radiusShare(k);
         out.area[i] = side * side * share * share;
         if (out.shapes) {
             const Surfel& s = surfels_[size_t(i)];
@@ -488,8 +488,7 @@ void surfelAttributes(const TileContext& context, const Mat3& world_from_camera,
     sample.alpha = 1.0f;
     sample.finish = plainFinish(scene.materials[sample.material]);
     // What lies within a disc is told apart no more.
-    const float side =
-        level.spacing * (level.radius.empty() ? 1.0f : surfelRadius(level.radius[index]));
+    const float side = level.spacing * level.radiusShare(index);
     sample.patch_width =
         std::max(mesh.surfels->finishes[finish].patch_width, side) * run.length_scale;
     sample.object = objectId(run.path);

@@ -65,6 +65,21 @@ uint8_t surfelRadiusCode(float share) {
     return uint8_t(std::clamp(std::ceil(code), 1.0f, 255.0f));  // never smaller than asked for
 }
 
+namespace {
+
+// By how much a shape's radius is less than its code's, 256ths of an octave.
+uint8_t shapeLess(float share) {
+    const float octaves = (float(surfelRadiusCode(share)) - 128.0f) * 0.125f;
+    const float less = 256.0f * (octaves - std::log2(std::max(share, 1e-6f)));
+    return uint8_t(std::clamp(std::floor(less), 0.0f, 31.0f));
+}
+
+}  // namespace
+
+float keptShapeRadius(float share) {
+    return surfelRadius(surfelRadiusCode(share)) * std::exp2(-float(shapeLess(share)) / 256.0f);
+}
+
 float quantizedRatio(float ratio) {
     return std::clamp(std::round(ratio * 255.0f), 1.0f, 255.0f) / 255.0f;
 }
@@ -158,7 +173,8 @@ SurfelShape packShape(const Surfel& s, std::vector<SurfelCut>& cuts) {
     tangents(unpackNormal32(shape.normal), u, v);
     shape.turn = turnOf(glm::dot(s.along, u), glm::dot(s.along, v));
     shape.ratio = uint8_t(std::lround(quantizedRatio(s.ratio) * 255.0f));
-    shape.n_cuts = uint8_t(s.n_cuts);
+    shape.n_cuts = uint8_t(s.n_cuts) & 7;
+    shape.less = shapeLess(s.radius_share) & 31;
     shape.first_cut = uint32_t(cuts.size());
     for (int i = 0; i < s.n_cuts; ++i) {
         const Vec3& cut = s.cuts[size_t(i)];
@@ -296,7 +312,7 @@ Surfel unpackSurfel(const SurfelLevel& level, const SurfelBlock& block, uint32_t
     const uint32_t bits = level.albedo_finish[i];
     s.albedo = unpackSrgb8(bits);
     s.finish = uint8_t(bits >> 24);
-    s.radius_share = level.radius.empty() ? 1.0f : surfelRadius(level.radius[i]);
+    s.radius_share = level.radiusShare(i);
     s.shading_normal = s.normal;
     if (!level.shapes.empty()) unpackShape(level, i, s);
     if (!level.bends.empty()) {
@@ -376,17 +392,16 @@ void measureBlock(const SurfelModel& model, const SurfelLevel& level, SurfelBloc
     DiscSides& sides = block.sides;
     sides.smallest = sides.largest = sides.longest = level.spacing;
     if (level.radius.empty()) return;
-    uint8_t least = 255, most = 0;
-    float longest = 0.0f;
+    float least = kInfinity, most = 0.0f, longest = 0.0f;
     for (uint32_t i = block.first; i < block.first + block.count; ++i) {
-        const uint8_t code = level.radius[i];
-        least = std::min(least, code), most = std::max(most, code);
+        const float share = level.radiusShare(i);
+        least = std::min(least, share), most = std::max(most, share);
         if (level.shapes.empty()) continue;
         const float ratio = float(level.shapes[i].ratio) / 255.0f;
-        longest = std::max(longest, surfelRadius(code) / std::sqrt(ratio));
+        longest = std::max(longest, share / std::sqrt(ratio));
     }
-    sides.smallest = level.spacing * surfelRadius(least);
-    sides.largest = level.spacing * surfelRadius(most);
+    sides.smallest = level.spacing * least;
+    sides.largest = level.spacing * most;
     sides.longest = std::max(level.spacing * longest, sides.largest);
 }
 
@@ -488,7 +503,7 @@ void checkSurfelLevels(const std::vector<SurfelLevel>& levels, size_t n_finishes
               "has a spacing that is no length");
         for (uint32_t i = 0; i < uint32_t(level.radius.size()); ++i) {
             const float ratio = level.shapes.empty() ? 1.0f : float(level.shapes[i].ratio) / 255.0f;
-            check(level.spacing * surfelRadius(level.radius[i]) < 1e15f * std::sqrt(ratio), where,
+            check(level.spacing * level.radiusShare(i) < 1e15f * std::sqrt(ratio), where,
                   "has a splat whose size is no length");
         }
         uint64_t next = 0;

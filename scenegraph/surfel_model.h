@@ -66,7 +66,8 @@ struct SurfelShape {
     std::array<uint16_t, 2> normal = {0, 0};  // octahedral
     uint16_t turn = 0;    // to the long half axis, 65536ths of a turn from the normal's tangent
     uint8_t ratio = 255;  // of the short half axis to the long one, 255ths
-    uint8_t n_cuts = 0;
+    uint8_t n_cuts : 3 = 0;
+    uint8_t less : 5 = 0;    // its radius is so many 256ths of an octave less than its code says
     uint32_t first_cut = 0;  // of SurfelLevel::cuts
 };
 static_assert(sizeof(SurfelShape) == 12);
@@ -104,6 +105,8 @@ struct SurfelLevel {
     SurfelBalls balls;              // one a block; not in files: measureDiscs()
 
     size_t size() const { return position.size(); }
+    // Of a surfel's disc, spacings.
+    float radiusShare(size_t i) const;
     static Vec3 step(const SurfelBlock& block) {
         return block.bounds.extent() / Vec3(positionSteps(0), positionSteps(1), positionSteps(2));
     }
@@ -112,6 +115,13 @@ struct SurfelLevel {
 // Radii in eighths of an octave, as a share of SurfelLevel::spacing.
 inline float surfelRadius(uint8_t code) { return std::exp2((float(code) - 128.0f) * 0.125f); }
 uint8_t surfelRadiusCode(float share);
+// The radius that a level keeps of a shape's, in 256ths of an octave: no smaller.
+float keptShapeRadius(float share);
+inline float SurfelLevel::radiusShare(size_t i) const {
+    if (radius.empty()) return 1.0f;
+    if (shapes.empty()) return surfelRadius(radius[i]);
+    return std::exp2((float(radius[i]) - 128.0f) * 0.125f - float(shapes[i].less) / 256.0f);
+}
 // The ratio that SurfelShape keeps of a ratio of half axes.
 float quantizedRatio(float ratio);
 

@@ -26,8 +26,8 @@ Surfel surfelOf(const Splat& splat, float spacing) {
     s.n_cuts = splat.n_cuts;
     s.shading_normal = splat.shading_normal;
     // Of the half axis that the model will have: radii are rounded up.
-    const float kept_radius = surfelRadius(surfelRadiusCode(s.radius_share)) * spacing /
-                              kSharePerRadius / std::sqrt(s.ratio);
+    const float kept_radius =
+        keptShapeRadius(s.radius_share) * spacing / kSharePerRadius / std::sqrt(s.ratio);
     s.bend = splat.bend * kept_radius;
     for (int i = 0; i < splat.n_cuts; ++i) {
         const Vec3& cut = splat.cuts[size_t(i)];

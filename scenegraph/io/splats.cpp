@@ -8,6 +8,7 @@
 #include <scenegraph/io/splat_bend.h>
 #include <scenegraph/io/splat_border.h>
 #include <scenegraph/io/splat_choice.h>
+#include <scenegraph/io/splat_close.h>
 #include <scenegraph/io/splat_pack.h>
 #include <scenegraph/surface_at.h>
 #include <scenegraph/surfel_finish.h>
@@ -91,10 +92,12 @@ public:
                 std::vector<NearPoint> near;
                 for (size_t k = chunk * kChunk; k < std::min(splats.size(), (chunk + 1) * kChunk);
                      ++k) {
-                    bendNormals(points_, chosen[k].covered, splats[k]);
                     if (rules.has_cuts) cutAtBorders(points_, index, near, splats[k]);
                 }
             });
+            narrowGaps(points_, index, chosen, splats, pool_, cancel_);
+            for (size_t k = 0; k < splats.size(); ++k)
+                bendNormals(points_, chosen[k].covered, splats[k]);
         }
         // One surface, whose holes may be closed.
         for (SurfelFinish& finish : finishes_) finish.patch_width = float(diagonal);
