@@ -174,8 +174,7 @@ Vec3 shade(const SurfaceSample& found, const Material& material, const Lighting&
     if (material.unlit) return sample.albedo;
     const Vec3 to_eye_camera =
         view.orthographic ? Vec3(0.0f, 0.0f, -1.0f) : -sample.position_camera;
-    const Vec3 to_eye =
-        glm::normalize(Mat3(glm::transpose(view.camera_from_world)) * to_eye_camera);
+    const Vec3 to_eye = glm::normalize(view.world_from_camera * to_eye_camera);
     Vec3 n = sample.normal_world;
     if (material.double_sided && glm::dot(n, to_eye) < 0.0f) n = -n;
 
@@ -223,7 +222,7 @@ Vec3 shade(const SurfaceSample& found, const Material& material, const Lighting&
         if (visible > 0.0f) addLight(sun.direction_to_light, sun.irradiance * visible);
     }
     if (!lighting.points.empty()) {
-        const Vec3 from_eye = Mat3(glm::transpose(view.camera_from_world)) * sample.position_camera;
+        const Vec3 from_eye = view.world_from_camera * sample.position_camera;
         for (size_t i = 0; i < lighting.points.size(); ++i) {
             const PointLight& light = lighting.points[i];
             // Relative to the eye, so that floats do far from the origin too.

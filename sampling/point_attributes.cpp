@@ -61,8 +61,7 @@ void pointAttributes(const Scene& scene, const View& view, const Run& run, const
         sample.albedo = unpackSrgb8(list.albedo_or_place[lane]);
         sample.finish = plainFinish(material);
     }
-    sample.normal_world =
-        glm::normalize(Mat3(glm::transpose(view.camera_from_world)) * normal_camera);
+    sample.normal_world = glm::normalize(view.world_from_camera * normal_camera);
 }
 
 }  // namespace stipple

@@ -39,8 +39,8 @@ void triangleAttributes(const Scene& scene, const View& view, const InstanceFram
         surfaceAt(mesh, scene.materials, scene.textures, triangle, uv.x, uv.y,
                   sampleBeam(view, sub_x, sub_y, sample, float(std::sqrt(frame.area_scale)),
                              frame.camera_from_normal));
-    sample.normal_world = glm::normalize(Mat3(glm::transpose(view.camera_from_world)) *
-                                         (frame.camera_from_normal * surface.normal_object));
+    sample.normal_world =
+        glm::normalize(view.world_from_camera * (frame.camera_from_normal * surface.normal_object));
     sample.albedo = surface.albedo;
     sample.finish = surface.finish;
     sample.material = mesh.triangle_material[triangle];

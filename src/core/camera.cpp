@@ -39,7 +39,7 @@ View makeView(const Camera& camera, int width, int height, int subpixels) {
     view.subpixels = subpixels;
     view.orthographic = camera.orthographic;
     view.eye_world = camera.eye;
-    view.camera_from_world = glm::transpose(camera.world_from_camera);
+    view.turnTo(glm::transpose(camera.world_from_camera));
     view.focal = camera.orthographic ? view.subHeight() / camera.height
                                      : 0.5 * view.subHeight() / std::tan(0.5 * camera.fov_y);
     view.center_x = 0.5 * view.subWidth();

@@ -34,13 +34,18 @@ struct View {
     int subpixels = 1;  // along one side of a pixel
     bool orthographic = false;
     DVec3 eye_world = DVec3(0.0);
-    DMat3 camera_from_world = DMat3(1.0);  // rotation about the eye
+    DMat3 camera_from_world = DMat3(1.0);  // rotation about the eye; see turnTo()
+    Mat3 world_from_camera = Mat3(1.0f);   // its inverse
     double focal = 1.0;     // subpixels per unit of x/z (perspective) or per metre (orthographic)
     double center_x = 0.0;  // subpixel coordinates of the optical axis
     double center_y = 0.0;
     float near_z = 0.05f;
     float far_z = 1e9f;
 
+    void turnTo(const DMat3& rotation) {
+        camera_from_world = rotation;
+        world_from_camera = Mat3(glm::transpose(rotation));
+    }
     int subWidth() const { return width * subpixels; }
     int subHeight() const { return height * subpixels; }
     // Subpixel coordinates of a point in camera space (z > 0).

@@ -372,7 +372,7 @@ private:
         }
         View view;
         view.width = view.height = kAlong * kPageTexels;
-        view.camera_from_world = glm::transpose(space.world_from_light);
+        view.turnTo(glm::transpose(space.world_from_light));
         view.focal = 1.0 / texel;
         bool is_empty = false;
         if (space.is_lamp) {

@@ -152,7 +152,7 @@ void checkDepths(bool orthographic, float near_z) {
     camera.height = 5000.0;
     camera.near_z = near_z;
     View view = makeView(camera, 160, 120, 2);
-    view.camera_from_world = DMat3(1.0);
+    view.turnTo(DMat3(1.0));
     const RasterTarget target = stage.render(view);
     int n = 0;
     for (int y = 0; y < target.height; ++y) {

@@ -129,7 +129,7 @@ TEST(ReconstructShade, evenSurroundingsAreMirroredAsTheLobeHasIt) {
     Lighting lighting;
     lighting.sky.zenith = lighting.sky.horizon = lighting.sky.ground = Vec3(1.0f);
     View view;
-    view.camera_from_world = DMat3(1.0);
+    view.turnTo(DMat3(1.0));
     for (const float metallic : {0.0f, 1.0f}) {
         for (const float roughness : {0.2f, 0.5f, 0.9f}) {
             for (const double cosine : {1.0, 0.6, 0.3}) {
@@ -154,7 +154,7 @@ TEST(ReconstructShade, aSunsHighlightIsTheLobeTimesItsIrradiance) {
     const Vec3 light = directionAt(0.8, 0.3), eye = directionAt(0.7, 2.0);
     lighting.suns.push_back({light, Vec3(2.0f)});
     View view;
-    view.camera_from_world = DMat3(1.0);
+    view.turnTo(DMat3(1.0));
     SurfaceSample sample;
     sample.position_camera = -3.0f * eye;
     sample.normal_world = kNormal;
