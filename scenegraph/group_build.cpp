@@ -4,6 +4,8 @@
 #include <scenegraph/group_sums.h>
 #include <scenegraph/morton.h>
 
+#include <bit>
+
 namespace stipple {
 
 namespace {
@@ -148,14 +150,16 @@ struct ChunkSums {
     size_t bad_instance = SIZE_MAX;  // the first with a transform that cannot be
 };
 
-// Where an instance's box is and how large. Floats do: they only choose the cell it resides in.
+// Where an instance's box is and how large. Floats do: they only choose the cell it resides in,
+// whose key takes its place.
 struct Extent {
     Vec3 center;  // from the first instance's translation
     float diameter;
 };
+static_assert(sizeof(Extent) == sizeof(CellKey));
 
 ChunkSums measure(const Scene& scene, const Group& group, const ChildTable& children, size_t begin,
-                  size_t end, std::vector<Extent>& extents) {
+                  size_t end, std::vector<CellKey>& extents) {
     ChunkSums sums;
     const DVec3 origin = group.instances.groupFromChild(0).translation;
     for (size_t i = begin; i < end; ++i) {
@@ -182,8 +186,10 @@ ChunkSums measure(const Scene& scene, const Group& group, const ChildTable& chil
         }
         DVec3 center, half;
         const bool has_box = instanceBox(children(child), transform, center, half);
-        extents[i] = {Vec3(center - origin), has_box ? float(2.0 * glm::length(half)) : 0.0f};
-        sums.centers.extend(extents[i].center);
+        const Extent extent = {Vec3(center - origin),
+                               has_box ? float(2.0 * glm::length(half)) : 0.0f};
+        extents[i] = std::bit_cast<CellKey>(extent);
+        sums.centers.extend(extent.center);
         if (has_box) sums.bounds.extend(DBox3{center - half, center + half});
     }
     return sums;
@@ -230,12 +236,12 @@ void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool
     const size_t n = group.instances.size();
     const size_t n_chunks = (n + kChunkInstances - 1) / kChunkInstances;
     const ChildTable children(scene, group);
-    std::vector<Extent> extents(n);
+    std::vector<CellKey> keys(n);  // extents at first
     std::vector<ChunkSums> chunks(n_chunks);
     pool.forEach(n_chunks, [&](size_t c, int) {
         const size_t begin = c * kChunkInstances;
         chunks[c] =
-            measure(scene, group, children, begin, std::min(n, begin + kChunkInstances), extents);
+            measure(scene, group, children, begin, std::min(n, begin + kChunkInstances), keys);
     });
     group.bounds = DBox3();
     group.instances_total = group.triangles_total = 0.0;
@@ -263,13 +269,12 @@ void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool
 
     const DVec3 extent = n ? DVec3(centers.extent()) : DVec3(1.0);
     const double side = std::max({extent.x, extent.y, extent.z, 1e-30});
-    std::vector<CellKey> keys(n);
     pool.forEach(n_chunks, [&](size_t c, int) {
         const size_t begin = c * kChunkInstances, end = std::min(n, begin + kChunkInstances);
         for (size_t i = begin; i < end; ++i)
-            keys[i] = cellKey(extents[i], uint32_t(i), DVec3(centers.min), side);
+            keys[i] =
+                cellKey(std::bit_cast<Extent>(keys[i]), uint32_t(i), DVec3(centers.min), side);
     });
-    extents = std::vector<Extent>();
     parallelSort(pool, keys, std::less<CellKey>());
     std::vector<uint32_t> order(n);
     for (size_t i = 0; i < n; ++i) order[i] = keys[i].index;

@@ -35,26 +35,23 @@ private:
 };
 
 // Sorts by `less`, which must order any two elements, so that the result is the same for any number
-// of threads. Needs the memory of `values` once more. O(n log n).
+// of threads. In place. O(n log n).
 template <class T, class Less>
 void parallelSort(ThreadPool& pool, std::vector<T>& values, const Less& less) {
     constexpr size_t kSmallestRun = 16384;
     size_t n_runs = 1;
-    while (n_runs < 4 * size_t(pool.threadCount()) && values.size() / (2 * n_runs) >= kSmallestRun)
+    const auto begin = [&](size_t run) {
+        return values.begin() + ptrdiff_t(values.size() * run / n_runs);
+    };
+    // Halves, of which all of the first go before all of the second, and again.
+    while (n_runs < 4 * size_t(pool.threadCount()) &&
+           values.size() / (2 * n_runs) >= kSmallestRun) {
         n_runs *= 2;
-    const auto begin = [&](size_t run) { return values.size() * run / n_runs; };
-    pool.forEach(n_runs, [&](size_t run, int) {
-        std::sort(values.begin() + begin(run), values.begin() + begin(run + 1), less);
-    });
-    if (n_runs == 1) return;
-    std::vector<T> merged(values.size());
-    for (; n_runs > 1; n_runs /= 2, values.swap(merged)) {
-        pool.forEach(n_runs / 2, [&](size_t pair, int) {
-            const size_t a = begin(2 * pair), b = begin(2 * pair + 1), end = begin(2 * pair + 2);
-            std::merge(values.begin() + a, values.begin() + b, values.begin() + b,
-                       values.begin() + end, merged.begin() + a, less);
+        pool.forEach(n_runs / 2, [&](size_t half, int) {
+            std::nth_element(begin(2 * half), begin(2 * half + 1), begin(2 * half + 2), less);
         });
     }
+    pool.forEach(n_runs, [&](size_t run, int) { std::sort(begin(run), begin(run + 1), less); });
 }
 
 }  // namespace stipple
