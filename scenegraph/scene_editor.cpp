@@ -5,6 +5,7 @@
 #include <scenegraph/group_sums.h>
 
 #include <algorithm>
+#include <exception>
 #include <numeric>
 
 namespace stipple {
@@ -233,9 +234,45 @@ void SceneEditor::replace(InstanceId id, ChildRef child) {
     place(id, child, where);
 }
 
+namespace {
+
+// What one thread takes of many instances at a time.
+constexpr size_t kChunkInstances = 4096;
+
+size_t chunksOf(const std::vector<SceneEditor::NewInstance>& instances) {
+    return (instances.size() + kChunkInstances - 1) / kChunkInstances;
+}
+
+template <class Visit>
+void forChunk(const std::vector<SceneEditor::NewInstance>& instances, size_t chunk,
+              const Visit& visit) {
+    const size_t end = std::min(instances.size(), (chunk + 1) * kChunkInstances);
+    for (size_t i = chunk * kChunkInstances; i < end; ++i) visit(instances[i]);
+}
+
+}  // namespace
+
+// Throws what the first that cannot be inserted is refused for, whatever the threads.
+void SceneEditor::checkInserts(uint32_t group, const std::vector<NewInstance>& instances,
+                               ThreadPool& pool) const {
+    std::vector<std::exception_ptr> errors(chunksOf(instances));
+    pool.forEach(errors.size(), [&](size_t chunk, int) {
+        try {
+            forChunk(instances, chunk, [&](const NewInstance& i) {
+                checkInsert(group, i.child, i.group_from_child);
+            });
+        } catch (...) {
+            errors[chunk] = std::current_exception();
+        }
+    });
+    for (const std::exception_ptr& error : errors) {
+        if (error) std::rethrow_exception(error);
+    }
+}
+
 InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewInstance>& instances,
                                    ThreadPool& pool) {
-    for (const NewInstance& i : instances) checkInsert(group_index, i.child, i.group_from_child);
+    checkInserts(group_index, instances, pool);
     opened(group_index);
     Group& group = scene_.groups[group_index];
     const InstanceId first{group_index, group.next_index};
@@ -247,10 +284,13 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
         return first;
     }
     const double instances_before = group.instances_total, triangles_before = group.triangles_total;
+    group.instances.addChunks(pool, chunksOf(instances), [&](size_t chunk, InstanceStore& store) {
+        forChunk(instances, chunk,
+                 [&](const NewInstance& i) { store.add(i.child, i.group_from_child); });
+    });
     for (const NewInstance& i : instances) {
         const InstanceId id{group_index, group.next_index};
         addUse(id, i.child);
-        group.instances.add(i.child, i.group_from_child);
         group.listed_index.push_back(group.next_index++);
         markEdited(id);
     }

@@ -123,6 +123,8 @@ private:
     OpenGroup& opened(uint32_t group);
     uint32_t slotOf(InstanceId id);
     void checkInsert(uint32_t group, ChildRef child, const Affine& group_from_child) const;
+    void checkInserts(uint32_t group, const std::vector<NewInstance>& instances,
+                      ThreadPool& pool) const;
     bool reaches(ChildRef from, uint32_t group) const;
     void addUse(InstanceId place, ChildRef child);
     void removeUse(InstanceId place, ChildRef child);
