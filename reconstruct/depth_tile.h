@@ -52,11 +52,20 @@ public:
             }
         }
         if (is_hidden || int64_t(x1 - x0) * (y1 - y0) > kSmallRect) return is_hidden;
+        // Depths are not negative: keys are ordered as they are.
+        const uint64_t limit = pack(z_min > 0.0f ? z_min : 0.0f, 0);
         // From the top, where what is far shows first.
         for (int y = y0; y < y1; ++y) {
             const uint64_t* keys = keys_.data() + size_t(y) * size_t(stride());
-            for (int x = x0; x < x1; ++x) {
-                if (!(depthOf(keys[x]) < z_min)) return false;
+            // Four at a time, one branch.
+            int x = x0;
+            for (; x + 4 <= x1; x += 4) {
+                if (bool(keys[x] >= limit) | bool(keys[x + 1] >= limit) |
+                    bool(keys[x + 2] >= limit) | bool(keys[x + 3] >= limit))
+                    return false;
+            }
+            for (; x < x1; ++x) {
+                if (keys[x] >= limit) return false;
             }
         }
         return true;

@@ -156,7 +156,8 @@ MeshSurface surfaceAt(const Mesh& mesh, const std::vector<Material>& materials,
                       const LookupBeam& beam) {
     Place place{mesh, textures, mesh.triangles[triangle], u, v};
     const Material& material = materials[mesh.triangle_material[triangle]];
-    if (material.isTextured()) place.setBeam(beam);
+    const bool is_textured = material.isTextured();
+    if (is_textured) place.setBeam(beam);
     const UVec3& t = place.t;
     MeshSurface s;
     if (!mesh.normals.empty()) s.normal_object = interpolate(mesh.normals, t, u, v);
@@ -164,11 +165,12 @@ MeshSurface surfaceAt(const Mesh& mesh, const std::vector<Material>& materials,
         s.normal_object = glm::cross(mesh.positions[t.y] - mesh.positions[t.x],
                                      mesh.positions[t.z] - mesh.positions[t.x]);
     }
-    s.normal_object = mappedNormal(place, material, safeNormalize(s.normal_object));
+    s.normal_object = safeNormalize(s.normal_object);
+    if (is_textured) s.normal_object = mappedNormal(place, material, s.normal_object);
     const Vec4 color = baseColor(place, material);
     s.albedo = Vec3(color);
     s.alpha = color.w;
-    s.finish = finishAt(place, material);
+    s.finish = is_textured ? finishAt(place, material) : plainFinish(material);
     return s;
 }
 
