@@ -23,6 +23,8 @@ class SampleLookup {
 public:
     virtual ~SampleLookup() = default;
     virtual void lookUp(uint32_t number, float sub_x, float sub_y, SurfaceSample& sample) const = 0;
+    // Reads ahead what lookUp() will need soon.
+    virtual void prefetch(uint32_t) const {}
 };
 
 // What all tiles of a frame share.

@@ -58,6 +58,21 @@ void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y
     last_number_ = number;
 }
 
+void SubpixelShader::readAhead(const SampleLookup& lookup, const DepthTile& tile, int px,
+                               int py) const {
+    const int s = context_.view.subpixels;
+    if ((px + 1) * s > tile.rect().x1) return;
+    uint32_t last = kNoNumber;
+    for (int y = py * s; y < (py + 1) * s; ++y) {
+        const uint64_t* row = tile.row(y);
+        for (int x = px * s; x < (px + 1) * s; ++x) {
+            const uint32_t number = DepthTile::numberOf(row[x]);
+            if (number != kNoNumber && number != last) lookup.prefetch(number & ~kSurfaceBit);
+            last = number;
+        }
+    }
+}
+
 bool SubpixelShader::hasVariedLight() const {
     return context_.light_visibility || context_.ambient_visibility ||
            !context_.lighting->projectors.empty();

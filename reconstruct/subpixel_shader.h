@@ -62,6 +62,8 @@ public:
     template <class Take>
     void showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
                    const Take& take);
+    // Has the memory read what pixel (px, py), if it is in the tile, will show.
+    void readAhead(const SampleLookup& lookup, const DepthTile& tile, int px, int py) const;
     // Side of the squares of subpixels within which one look-up may do for all.
     int sharedSide() const {
         const int side = std::min(kSharedCells, context_.view.subpixels);
@@ -119,6 +121,7 @@ template <class Take>
 void SubpixelShader::showPixel(const SampleLookup& lookup, const DepthTile& tile, int px, int py,
                                const Take& take) {
     const int s = context_.view.subpixels;
+    readAhead(lookup, tile, px + 2, py);
     if (s == 1) {
         const uint64_t key = tile.row(py)[px];
         if (DepthTile::numberOf(key) != kNoNumber) show(lookup, key, px, py);

@@ -35,10 +35,12 @@ uint32_t packPlace(Vec2 uv) {
 
 Vec2 unpackPlace(uint32_t p) { return Vec2(p & 0xffff, p >> 16) / 65535.0f; }
 
-struct PointLists::List {
-    uint32_t block_count = 0;
-    std::unique_ptr<ListBlock[]> blocks;
-};
+PointLists::List PointLists::List::make(uint32_t block_count) {
+    List list;
+    list.bits_ = reinterpret_cast<uintptr_t>(new ListBlock[block_count]) |
+                 uintptr_t(std::countr_zero(block_count));
+    return list;
+}
 
 namespace {
 
@@ -93,7 +95,8 @@ void PointLists::findStale() {
 }
 
 PointLists::~PointLists() {
-    forEachSlot([](Slot& slot) { delete slot.list.load(); });
+    forEachSlot([](Slot& slot) { slot.list.load().destroy(); });
+    freeRetired();
     for (auto& seen : seen_) delete seen.load();
 }
 
@@ -207,16 +210,22 @@ PointLists::Slot& PointLists::slotOf(const ListName& name) {
 }
 
 void PointLists::drop(Slot& slot) {
-    List* list = slot.list.exchange(nullptr);
-    if (!list) return;
-    bytes_ -= list->block_count * sizeof(ListBlock);
-    delete list;
+    List list = slot.list.exchange(List());
+    bytes_ -= list.blockCount() * sizeof(ListBlock);
+    list.destroy();
+}
+
+void PointLists::freeRetired() {
+    for (List& list : retired_) list.destroy();
+    retired_.clear();
+    bytes_ -= std::exchange(retired_bytes_, 0);
 }
 
 void PointLists::dropEdited(const ListName& name) {
     Slot& slot = slotOf(name);
-    const List* list = slot.list.load();
-    if (list && slot.last_used.load() == frame_) dropped_.push_back({name, list->block_count});
+    const List list = slot.list.load();
+    if (!list.isNull() && slot.last_used.load() == frame_)
+        dropped_.push_back({name, list.blockCount()});
     drop(slot);
 }
 
@@ -270,8 +279,7 @@ void PointLists::sceneChanged(const SceneChanges& changes) {
 }
 
 void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes, ThreadPool& pool) {
-    retired_.clear();
-    bytes_ -= std::exchange(retired_bytes_, 0);
+    freeRetired();
     budget_ = budget_bytes;
     const bool is_new = !(identity == identity_);
     identity_ = identity;
@@ -299,7 +307,7 @@ void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes, T
 void PointLists::remakeDropped(ThreadPool& pool) {
     struct Job {
         ListName name;
-        List* list;
+        ListBlock* out;
         uint32_t block;
     };
     std::vector<Job> jobs;
@@ -307,19 +315,18 @@ void PointLists::remakeDropped(ThreadPool& pool) {
         Slot& slot = slotOf(name);
         const std::vector<GroupNode>& nodes = scene_.groups[name.child.index()].nodes;
         // A group that was built anew may have fewer.
-        if (name.node >= nodes.size() || !(nodes[name.node].area > 0.0) || slot.list.load() ||
-            !hasLists(name.child) || !takeBudget(block_count * sizeof(ListBlock)))
+        if (name.node >= nodes.size() || !(nodes[name.node].area > 0.0) ||
+            !slot.list.load().isNull() || !hasLists(name.child) ||
+            !takeBudget(block_count * sizeof(ListBlock)))
             continue;
-        auto list = std::make_unique<List>();
-        list->block_count = block_count;
-        list->blocks = std::make_unique_for_overwrite<ListBlock[]>(block_count);
-        for (uint32_t b = 0; b < block_count; ++b) jobs.push_back({name, list.get(), b});
-        slot.list = list.release();
+        const List list = List::make(block_count);
+        for (uint32_t b = 0; b < block_count; ++b) jobs.push_back({name, list.blocks() + b, b});
+        slot.list = list;
         slot.last_used = frame_;
     }
     pool.forEach(jobs.size(), [&](size_t i, int) {
         const Job& job = jobs[i];
-        makePoints(job.name, job.block * kBlockPoints, kBlockPoints, job.list->blocks[job.block]);
+        makePoints(job.name, job.block * kBlockPoints, kBlockPoints, *job.out);
     });
 }
 
@@ -513,29 +520,25 @@ void PointLists::makePoints(const ListName& name, uint32_t first, int count, Lis
     });
 }
 
-PointLists::List* PointLists::grow(Slot& slot, const ListName& name, uint32_t n_blocks) {
+PointLists::List PointLists::grow(Slot& slot, const ListName& name, uint32_t n_blocks) {
     const std::lock_guard lock(stripes_[(name.child.bits * 31 + name.node) % kStripes]);
-    List* old = slot.list.load(std::memory_order_acquire);
-    if (old && old->block_count >= n_blocks) return old;
-    uint32_t capacity = 1;
-    while (capacity < n_blocks) capacity *= 2;
-    if (!takeBudget(capacity * sizeof(ListBlock))) return nullptr;
-    auto list = std::make_unique<List>();
-    list->block_count = capacity;
-    list->blocks = std::make_unique_for_overwrite<ListBlock[]>(capacity);
-    const uint32_t have = old ? old->block_count : 0;
-    if (old) std::memcpy(list->blocks.get(), old->blocks.get(), have * sizeof(ListBlock));
+    const List old = slot.list.load(std::memory_order_acquire);
+    const uint32_t have = old.blockCount();
+    if (have >= n_blocks) return old;
+    const uint32_t capacity = std::bit_ceil(n_blocks);
+    if (!takeBudget(capacity * sizeof(ListBlock))) return List();
+    const List list = List::make(capacity);
+    std::copy_n(old.blocks(), have, list.blocks());
     for (uint32_t b = have; b < capacity; ++b)
-        makePoints(name, b * kBlockPoints, kBlockPoints, list->blocks[b]);
-    List* result = list.release();
-    slot.list.store(result, std::memory_order_release);
-    if (old) {
+        makePoints(name, b * kBlockPoints, kBlockPoints, list.blocks()[b]);
+    slot.list.store(list, std::memory_order_release);
+    if (have > 0) {
         // Other threads may still read it; it goes when the frame is over.
         const std::lock_guard retired_lock(mutex_);
         retired_bytes_ += have * sizeof(ListBlock);
-        retired_.emplace_back(old);
+        retired_.push_back(old);
     }
-    return result;
+    return list;
 }
 
 const ListBlock& PointLists::points(const ListName& name, uint32_t first, int count,
@@ -543,16 +546,15 @@ const ListBlock& PointLists::points(const ListName& name, uint32_t first, int co
     const uint32_t block = first / kBlockPoints;
     if (budget_ > 0 && first < list_length) {
         Slot& slot = slotOf(name);
-        List* list = slot.list.load(std::memory_order_acquire);
-        if (!list || list->block_count <= block) {
+        List list = slot.list.load(std::memory_order_acquire);
+        if (list.blockCount() <= block)
             list = grow(slot, name, (list_length + kBlockPoints - 1) / kBlockPoints);
-        }
-        if (list) {
+        if (!list.isNull()) {
             if (slot.last_used.load(std::memory_order_relaxed) != frame_) {
                 slot.last_used.store(frame_, std::memory_order_relaxed);
             }
             first_lane = int(first % kBlockPoints);
-            return list->blocks[block];
+            return list.blocks()[block];
         }
     }
     makePoints(name, first, count, scratch);

@@ -104,9 +104,23 @@ public:
     size_t bytes() const { return bytes_ + visible_bytes_; }
 
 private:
-    struct List;
+    // The blocks of a list and how many there are, a power of two, in one word: who draws them
+    // waits for memory once less. A null list has none.
+    class List {
+    public:
+        List() = default;
+        static List make(uint32_t block_count);
+        void destroy() { delete[] blocks(); }
+        bool isNull() const { return bits_ == 0; }
+        ListBlock* blocks() const { return reinterpret_cast<ListBlock*>(bits_ & ~kCountBits); }
+        uint32_t blockCount() const { return isNull() ? 0 : 1u << (bits_ & kCountBits); }
+
+    private:
+        static constexpr uintptr_t kCountBits = alignof(ListBlock) - 1;
+        uintptr_t bits_ = 0;
+    };
     struct Slot {
-        std::atomic<List*> list{nullptr};
+        std::atomic<List> list{List()};
         std::atomic<uint32_t> last_used{0};
     };
     using Slots = std::vector<Slot>;  // one a node
@@ -125,6 +139,7 @@ private:
     Slot& slotOf(const ListName& name);
     Seen& seen(uint32_t mesh, int direction);
     void drop(Slot& slot);
+    void freeRetired();
     void dropEdited(const ListName& name);
     void dropGroup(uint32_t group);
     void remakeDropped(ThreadPool& pool);
@@ -135,7 +150,7 @@ private:
     const SpacingTable& factorOf(ChildRef child);
     SpacingTable makeFactor(ChildRef child);
     bool takeBudget(size_t bytes);
-    List* grow(Slot& slot, const ListName& name, uint32_t n_blocks);
+    List grow(Slot& slot, const ListName& name, uint32_t n_blocks);
 
     const Scene& scene_;
     std::vector<Slots> mesh_slots_, group_slots_;
@@ -160,7 +175,7 @@ private:
     std::atomic<bool> is_full_{false};  // a list was refused in this frame
     uint32_t frame_ = 0;
     std::mutex mutex_;  // guards retired_
-    std::vector<std::unique_ptr<List>> retired_;
+    std::vector<List> retired_;
     size_t retired_bytes_ = 0;
     static constexpr int kStripes = 64;
     std::mutex stripes_[kStripes];  // one list grows at a time in each stripe

@@ -2,7 +2,6 @@
 #include <sampling/point_writer.h>
 
 #include <core/rng.h>
-#include <sampling/transform_kernel.h>
 
 #include <bit>
 
@@ -55,40 +54,79 @@ KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, 
 void PointWriter::add(const InstanceFrame& frame, const ListName& name, const RunDensity& density,
                       uint32_t first, uint32_t count) {
     if (count == 0) return;
-    const KernelParams params = makeParams(context_, frame, name.child, name.node,
-                                           name.direction != ListName::kWhole, density);
-    Run run;
+    Piece piece;
+    piece.params = makeParams(context_, frame, name.child, name.node,
+                              name.direction != ListName::kWhole, density);
+    piece.wanted = density.wanted;
+    Run& run = piece.run;
     run.camera_from_normal = frame.camera_from_normal;
     run.length_scale = float(std::sqrt(frame.area_scale));
     run.child = name.child;
     run.node = name.node;
     run.direction = name.direction;
-    run.list_length = params.random ? 0 : listLength(uint64_t(first) + count);
     run.path = frame.path;
+    const uint32_t list_length = piece.params.random ? 0 : listLength(uint64_t(first) + count);
     while (count > 0) {
         const uint32_t n = std::min(count, kBlockPoints - first % kBlockPoints);
-        if (block_.count + int(n) > kBlockPoints) flush();
-        if (block_.count == 0) first_run_ = context_.runs.size();
-        int lane;
-        const ListBlock& list =
-            context_.lists.points(name, first, int(n), run.list_length, scratch_, lane);
-        transformPoints(params, list, lane, first, int(n), context_.nextNumber(), block_.count,
-                        block_);
-        const bool has_blended =
-            context_.lists.identity().layers &&
-            markBlended(list, lane, int(n), context_.sink->wantsLayers(), name, first);
-        if (has_blended || (!density.narrow && context_.sink->wantsSurfels())) {
-            const View& view = context_.view;
-            makeSurfels({frame.camera_from_normal, float(view.focal), float(density.wanted),
-                         view.orthographic},
-                        list, lane, int(n), block_.count, block_);
-        }
+        piece.count = int(n);
         run.first_index = first;
-        context_.runs.push_back(run);
-        block_.count += int(n);
+        if (n_ahead_ == kAhead) drawNext();
+        piece.block =
+            &context_.lists.points(name, first, int(n), list_length, scratch_, piece.lane);
+        run.block = piece.block == &scratch_ ? nullptr : piece.block;
+        ahead_[(first_ahead_ + n_ahead_++) % kAhead] = piece;
+        if (run.block) {
+            prefetch(piece);
+        } else {
+            drawAhead();
+        }
         first += n;
         count -= n;
     }
+}
+
+void PointWriter::prefetch(const Piece& piece) {
+    const ListBlock& block = *piece.block;
+    const auto read = [&](const auto& values) {
+        constexpr size_t kLine = 64;
+        const char* at = reinterpret_cast<const char*>(values + piece.lane);
+        const char* end = reinterpret_cast<const char*>(values + piece.lane + piece.count);
+        for (; at < end; at += kLine) __builtin_prefetch(at);
+    };
+    read(block.width);
+    for (const auto& axis : block.position) read(axis);
+    for (const auto& axis : block.normal) read(axis);
+    read(block.single_sided);
+}
+
+void PointWriter::drawAhead() {
+    while (n_ahead_ > 0) drawNext();
+}
+
+// The first of those read ahead.
+void PointWriter::drawNext() {
+    const Piece& piece = ahead_[first_ahead_];
+    first_ahead_ = (first_ahead_ + 1) % kAhead;
+    --n_ahead_;
+    const Run& run = piece.run;
+    const ListBlock& list = *piece.block;
+    const int n = piece.count;
+    if (block_.count + n > kBlockPoints) handOver();
+    if (block_.count == 0) first_run_ = context_.runs.size();
+    transformPoints(piece.params, list, piece.lane, run.first_index, n, context_.nextNumber(),
+                    block_.count, block_);
+    const ListName name = {run.child, run.node, run.direction};
+    const bool has_blended =
+        context_.lists.identity().layers &&
+        markBlended(list, piece.lane, n, context_.sink->wantsLayers(), name, run.first_index);
+    if (has_blended || (!piece.params.narrow && context_.sink->wantsSurfels())) {
+        const View& view = context_.view;
+        makeSurfels(
+            {run.camera_from_normal, float(view.focal), float(piece.wanted), view.orthographic},
+            list, piece.lane, n, block_.count, block_);
+    }
+    context_.runs.push_back(run);
+    block_.count += n;
 }
 
 // For sinks that want layers, tells which points are blended, if any; for others drops all but a
@@ -121,6 +159,11 @@ uint32_t PointWriter::firstOf(uint64_t path, uint32_t count, uint32_t length) co
 }
 
 void PointWriter::flush() {
+    drawAhead();
+    handOver();
+}
+
+void PointWriter::handOver() {
     if (block_.count > 0 && !context_.sink->take(block_)) context_.runs.resize(first_run_);
     block_.count = 0;
 }

@@ -4,6 +4,9 @@
 #pragma once
 
 #include <sampling/tile_context.h>
+#include <sampling/transform_kernel.h>
+
+#include <array>
 
 namespace stipple {
 
@@ -32,12 +35,28 @@ public:
     void flush();
 
 private:
+    // Consecutive points of one block of a list.
+    struct Piece {
+        KernelParams params;
+        Run run;
+        double wanted = 0.0;
+        const ListBlock* block = nullptr;
+        int lane = 0, count = 0;
+    };
+    static void prefetch(const Piece& piece);
+    void drawNext();
+    void drawAhead();
+    void handOver();
     bool markBlended(const ListBlock& list, int lane, int count, bool wants_layers,
                      const ListName& name, uint32_t first);
 
     TileContext& context_;
     size_t first_run_ = 0;  // of the block
     PointBlock block_;
+    // Pieces that wait until their points have come from memory: a ring.
+    static constexpr int kAhead = 4;
+    std::array<Piece, kAhead> ahead_;
+    int first_ahead_ = 0, n_ahead_ = 0;
     ListBlock scratch_;
 };
 

@@ -20,9 +20,9 @@ struct Run {
     ChildRef child;             // mesh or group
     uint32_t node = 0;
     int direction = ListName::kWhole;  // of the node's list
+    const ListBlock* block = nullptr;  // of first_index; null where the points are made anew
     uint32_t first_index = 0;          // of the node's list, or of the mesh's triangles
-    uint32_t list_length = 0;
-    uint64_t path = 0;  // of the mesh's or the group's instance
+    uint64_t path = 0;                 // of the mesh's or the group's instance
     // Index into frames: of triangles of a mesh, and of surfels whose normals turn.
     uint32_t frame = kNoFrame;
     int16_t surfel_level = -1;             // of a prebuilt model's surfels, from first_index on

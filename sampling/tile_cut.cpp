@@ -50,11 +50,21 @@ void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSampl
                            run.child.index(), index, sub_x, sub_y, sample);
         return;
     }
+    if (run.block) {
+        pointAttributes(context_.scene, context_.view, run, *run.block, int(index % kBlockPoints),
+                        sub_x, sub_y, sample);
+        return;
+    }
     int lane;
     ListBlock scratch;
-    const ListBlock& list = context_.lists.points({run.child, run.node, run.direction}, index, 1,
-                                                  run.list_length, scratch, lane);
+    const ListBlock& list =
+        context_.lists.points({run.child, run.node, run.direction}, index, 1, 0, scratch, lane);
     pointAttributes(context_.scene, context_.view, run, list, lane, sub_x, sub_y, sample);
+}
+
+void TileCut::prefetch(uint32_t number) const {
+    const Run& run = context_.runOf(number);
+    if (run.block) prefetchAttributes(*run.block, (run.first_index + number) % kBlockPoints);
 }
 
 void TileCut::forget() {

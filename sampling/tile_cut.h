@@ -20,6 +20,7 @@ public:
     void emit(const Batch& batch, PointSink& sink) override;
     void attributes(uint32_t number, float sub_x, float sub_y,
                     SurfaceSample& sample) const override;
+    void prefetch(uint32_t number) const override;
     void forget() override;
 
 private:

@@ -184,6 +184,8 @@ public:
     // (subpixel coordinates) at sample.depth.
     virtual void attributes(uint32_t number, float sub_x, float sub_y,
                             SurfaceSample& sample) const = 0;
+    // Reads ahead what attributes() will need soon.
+    virtual void prefetch(uint32_t) const {}
     virtual void forget() = 0;
 };
 

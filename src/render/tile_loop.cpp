@@ -88,6 +88,9 @@ public:
         }
         if (tints_kinds_) sample.albedo = (number & kAnyTriangle) ? kTriangleTint : kPointTint;
     }
+    void prefetch(uint32_t number) const override {
+        if (!(number & kZBufferBit)) emitter_->prefetch(number);
+    }
 
 private:
     const TileEmitter* emitter_;
