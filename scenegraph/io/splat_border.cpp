@@ -128,6 +128,12 @@ void cutAtBorders(const SplatPoints& points, const PointIndex& index, std::vecto
         const float angle = 2.0f * float(kPi) * float(k) / float(kCorners);
         corners.emplace_back(a * std::cos(angle), b * std::sin(angle));
     }
+    // What creases cut off is gone already.
+    std::vector<Vec2> kept;
+    for (int c = 0; c < splat.n_cuts; ++c) {
+        clip(corners, Vec2(splat.cuts[size_t(c)]), splat.cuts[size_t(c)].z, kept);
+        corners.swap(kept);
+    }
     for (const Vec3& line : chooseLines(corners, lines, size_t(kMostDiscCuts - splat.n_cuts)))
         splat.cuts[size_t(splat.n_cuts++)] = line;
 }

@@ -11,7 +11,7 @@ namespace stipple {
 // then larger on the sides where a line beside the rim meets none of the splats around, but has
 // points on all sides, so that one would look through. splats: those chosen, perhaps with more
 // cuts, with the gaps that they should have at most, about. The same for any number of threads.
-// Throws kCancelled. O(length of all rims), some 10 us a spacing.
+// Throws kCancelled. O(length of all rims), some 5 us a spacing.
 void narrowGaps(const SplatPoints& points, const PointIndex& index,
                 const std::vector<ChosenSplat>& chosen, std::vector<Splat>& splats,
                 ThreadPool& pool, const CancelFlag& cancel);
