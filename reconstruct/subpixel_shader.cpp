@@ -40,22 +40,13 @@ Vec3 SubpixelShader::shadeSample(const SurfaceSample& sample) const {
 }
 
 void SubpixelShader::show(const SampleLookup& lookup, uint64_t key, int x, int y) {
-    const uint32_t number = DepthTile::numberOf(key);
-    const float depth = DepthTile::depthOf(key);
-    const bool is_known = number == last_number_ && !(number & kAnyTriangle);
-    if (is_known && depth == sample_.depth && !hasVariedLight()) return;
-    const float sub_x = float(x) + 0.5f, sub_y = float(y) + 0.5f;
+    // Anew even where the subpixel beside shows the same point: what it shows there, and how it is
+    // lit, depends on the place, and which subpixel comes first on the tile.
+    const Vec2 p_sub(float(x) + 0.5f, float(y) + 0.5f);
     Vec3 origin, direction;
-    context_.view.ray(sub_x, sub_y, origin, direction);
-    if (is_known) {
-        // The same point elsewhere: on a slanted disc, or filled.
-        sample_.depth = depth;
-        sample_.position_camera = origin + direction * depth;
-        radiance_ = shadeSample(sample_);
-        return;
-    }
-    showPoint(lookup, origin + direction * depth, number, Vec2(sub_x, sub_y));
-    last_number_ = number;
+    context_.view.ray(p_sub.x, p_sub.y, origin, direction);
+    showPoint(lookup, origin + direction * DepthTile::depthOf(key), DepthTile::numberOf(key),
+              p_sub);
 }
 
 void SubpixelShader::readAhead(const SampleLookup& lookup, const DepthTile& tile, int px,
@@ -154,7 +145,6 @@ void SubpixelShader::lookUp(const SampleLookup& lookup, const Vec3& p_camera, ui
     sample_.depth = p_camera.z;
     sample_.position_camera = p_camera;
     lookup.lookUp(number & ~kSurfaceBit, p_sub.x, p_sub.y, sample_);
-    last_number_ = kNoNumber;
 }
 
 }  // namespace stipple

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Looks up and shades what a subpixel of a tile shows: once a point and depth, since neighbours
-// often show the same one. Used by every reconstruction that keeps the nearest.
+// Looks up and shades what a subpixel of a tile shows, or once for those of a pixel that show the
+// same. Used by every reconstruction that keeps the nearest.
 #pragma once
 
 #include <core/ambient_visibility.h>
@@ -47,10 +47,7 @@ public:
     }
 
     // Numbers mean something else in another tile.
-    void forget() {
-        last_number_ = kNoNumber;
-        varied_numbers_.fill(kNoNumber);
-    }
+    void forget() { varied_numbers_.fill(kNoNumber); }
     // Surface and radiance of a key that is not empty, seen at the centre of subpixel (x, y).
     void show(const SampleLookup& lookup, uint64_t key, int x, int y);
     // Calls take(x, y, key) for all subpixels of pixel (px, py) after surface and radiance have
@@ -100,7 +97,6 @@ private:
 
     const ReconstructionContext& context_;
     LightOnPlaces light_;
-    uint32_t last_number_ = kNoNumber;
     // Triangles whose normals were found to vary, each at its number modulo kVaried.
     static constexpr uint32_t kVaried = 1024;
     std::array<uint32_t, kVaried> varied_numbers_;

@@ -189,13 +189,14 @@ bool SurfelPoints::draw(uint32_t mesh_index, const InstanceFrame& frame, float z
         testBlocks(view.orthographic, window, linear, middle, reach, level.balls, first, n,
                    may_show.data());
         for (int i = 0; i < n; ++i) {
-            if (may_show[size_t(i)]) drawBlock(placed, level.blocks[first + size_t(i)], reach);
+            if (may_show[size_t(i)]) drawBlock(placed, first + size_t(i), reach);
         }
     }
     return true;
 }
 
-void SurfelPoints::drawBlock(const Placed& placed, const SurfelBlock& block, float reach) {
+void SurfelPoints::drawBlock(const Placed& placed, size_t index, float reach) {
+    const SurfelBlock& block = placed.level.blocks[index];
     if (coneHides(placed.eye, block) || maskHides(placed.eye, block)) return;
     const View& view = context_.view;
     const SurfelLevel& level = placed.level;
@@ -216,7 +217,7 @@ void SurfelPoints::drawBlock(const Placed& placed, const SurfelBlock& block, flo
     // Discs seen edge on cover no subpixel: their middles do.
     const bool with_points =
         !may_be_discs || !with_discs || sides.smallest * per_metre < kFewSubpixels;
-    if (with_discs || !may_be_discs) radius += placed.model.discSide() * sides.longest * reach;
+    if (with_discs || !may_be_discs) radius = level.balls.radius[index] * reach;
     if (center.z + radius <= view.near_z || center.z - radius > view.far_z) return;
     const SubpixelRect rect = ballRect(view, center, radius, region);
     if (!rect.overlaps(region)) return;

@@ -23,8 +23,8 @@ private:
 
     // Subpixels between points: each covers 1/K of one.
     float wantedSpacing() const;
-    // Unless it is hidden.
-    void drawBlock(const Placed& placed, const SurfelBlock& block, float reach);
+    // The block of that index, unless it is hidden.
+    void drawBlock(const Placed& placed, size_t index, float reach);
     bool findNear(const Placed& placed, const SurfelBlock& block, float reach);
     void drawPoints(const Placed& placed, const SurfelBlock& block);
     void unpackDiscs(const SurfelLevel& level, const SurfelBlock& block);

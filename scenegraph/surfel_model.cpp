@@ -405,6 +405,15 @@ void measureBlock(const SurfelModel& model, const SurfelLevel& level, SurfelBloc
     sides.longest = std::max(level.spacing * longest, sides.largest);
 }
 
+// How far ewa's splats reach around a surfel, spacings: a kernel's end is the root of 2, and an
+// ellipse may lie a tenth of itself beyond what its disc covers of a picture with perspective.
+// Discs with radii of their own are drawn half as large, less than discSide().
+constexpr float kSplatReach = 1.6f;
+
+float splatReach(const SurfelLevel& level, const SurfelBlock& block) {
+    return level.radius.empty() ? kSplatReach * block.sides.longest : 0.0f;
+}
+
 SurfelBalls ballsOf(const SurfelModel& model, const SurfelLevel& level) {
     SurfelBalls balls;
     const size_t n = level.blocks.size();
@@ -412,17 +421,19 @@ SurfelBalls ballsOf(const SurfelModel& model, const SurfelLevel& level) {
     for (const SurfelBlock& block : level.blocks) {
         const Vec3 p(DVec3(block.bounds.center()) - DVec3(model.bounds.center()));
         balls.x.push_back(p.x), balls.y.push_back(p.y), balls.z.push_back(p.z);
-        balls.radius.push_back(0.5f * glm::length(block.bounds.extent()) +
-                               model.discSide() * block.sides.longest);
+        const float reach =
+            std::max(model.discSide() * block.sides.longest, splatReach(level, block));
+        balls.radius.push_back(0.5f * glm::length(block.bounds.extent()) + reach);
     }
     return balls;
 }
 
-// Of its discs as polygons.
+// Of its discs, as polygons and as splats.
 Box3 drawnBounds(const SurfelModel& model, const SurfelLevel& level, const SurfelBlock& block) {
     Box3 bounds = block.bounds;
     if (level.shapes.empty()) {  // squares that are turned any way
-        const Vec3 reach(0.5f * std::sqrt(2.0f) * model.discSide() * block.sides.longest);
+        const Vec3 reach(std::max(0.5f * std::sqrt(2.0f) * model.discSide() * block.sides.longest,
+                                  splatReach(level, block)));
         return {bounds.min - reach, bounds.max + reach};
     }
     std::array<Vec3, kMostDiscCorners> corners;

@@ -314,6 +314,37 @@ TEST(PointBlocks, backsHideNothingBehindThem) {
     EXPECT_LE(compareImages(points, rays, pool).holes->count, 4u);
 }
 
+// Bit by bit, with and without leaving out what is hidden.
+void expectSameForAnyTiles(const Scene& scene, const std::vector<Camera>& cameras,
+                           const std::vector<Reconstruct>& methods, ThreadPool& pool) {
+    Renderer renderer(scene, pool);
+    for (const Reconstruct method : methods) {
+        for (size_t c = 0; c < cameras.size(); ++c) {
+            FrameRequest request;
+            request.camera = cameras[c];
+            request.settings.width = request.settings.height = 100;
+            request.settings.subpixels = 1;
+            request.settings.splat_size = 3.0;
+            request.settings.reconstruct = method;
+            for (const bool culls : {false, true}) {
+                request.settings.culling = culls;
+                request.settings.tile_size = 1024;
+                const Image whole = renderer.render(request).image;
+                for (const int tile : {8, 13, 31}) {
+                    request.settings.tile_size = tile;
+                    EXPECT_TRUE(whole.data == renderer.render(request).image.data)
+                        << "method " << int(method) << " camera " << c << " culling " << culls
+                        << " tile " << tile;
+                }
+            }
+        }
+    }
+}
+
+const std::vector<Reconstruct> kAllMethods = {Reconstruct::kPerPixel, Reconstruct::kSplat,
+                                              Reconstruct::kGaussian, Reconstruct::kPullPush,
+                                              Reconstruct::kEwa,      Reconstruct::kBins};
+
 // Blocks that lie elsewhere are left out of each tile: none that shows may be.
 TEST(PointBlocks, samePictureForAnyTiles) {
     ThreadPool pool(2);
@@ -328,32 +359,20 @@ TEST(PointBlocks, samePictureForAnyTiles) {
     cameras.push_back(cameras[0]);
     cameras.back().orthographic = true;
     cameras.back().height = 0.3 * (bounds.max.y - bounds.min.y);
-    for (const Reconstruct method : {Reconstruct::kPerPixel, Reconstruct::kEwa}) {
-        for (const Camera& camera : cameras) {
-            Renderer renderer(pair.model, pool);
-            FrameRequest request;
-            request.camera = camera;
-            request.settings.width = request.settings.height = 100;
-            request.settings.subpixels = 1;
-            request.settings.reconstruct = method;
-            request.settings.tile_size = 1024;
-            request.settings.culling = false;
-            const Image whole = renderer.render(request).image;
-            for (const int tile : {8, 31}) {
-                request.settings.tile_size = tile;
-                const Image tiled = renderer.render(request).image;
-                if (method == Reconstruct::kPerPixel) {
-                    EXPECT_EQ(whole.data, tiled.data) << tile;
-                    continue;
-                }
-                // By ewa single pixels differ, however blocks are chosen; a lost block is many.
-                int differing = 0;
-                for (size_t k = 0; k < whole.data.size(); ++k)
-                    differing += whole.data[k] != tiled.data[k];
-                EXPECT_LE(differing, 6) << tile;
-            }
-        }
-    }
+    expectSameForAnyTiles(pair.model, cameras, kAllMethods, pool);
+}
+
+// What a point shows in several subpixels depends on where they are.
+TEST(PointBlocks, samePictureOfWhatShinesForAnyTiles) {
+    ThreadPool pool(2);
+    Pair pair = makePair(torus(), 48, pool);
+    for (Material& material : pair.model.materials)
+        material.roughness = 0.2f, material.metallic = 0.5f;
+    pair.model.lighting.points.push_back({DVec3(0.5, 1.5, 0.5), Vec3(5.0f)});
+    expectSameForAnyTiles(pair.model,
+                          {cameraTo(pair.source, maskDirectionOf(3), 48, 100, 0.7),
+                           cameraTo(pair.source, maskDirectionOf(60), 48, 100, 3.0)},
+                          kAllMethods, pool);
 }
 
 }  // namespace

@@ -191,6 +191,14 @@ TEST(SurfelModel, ballsHoldWhatIsDrawnOfBlocks) {
                         EXPECT_LE(glm::distance(middle, s.position + corners[size_t(c)]),
                                   balls.radius[b] * 1.0001f);
                     }
+                    if (discs != SurfelDiscs::kAlike) continue;
+                    // The end of ewa's kernel, of a standard deviation of half a spacing.
+                    const float reach = 0.5f * std::sqrt(8.0f) * level.spacing;
+                    EXPECT_LE(glm::distance(middle, s.position) + reach, balls.radius[b]);
+                    for (int a = 0; a < 3 && &level == &model.levels[0]; ++a) {
+                        EXPECT_LE(model.drawn_bounds.min[a], s.position[a] - reach);
+                        EXPECT_GE(model.drawn_bounds.max[a], s.position[a] + reach);
+                    }
                 }
             }
         }
