@@ -130,6 +130,34 @@ Picture testPicture(const Vec3& to_viewer, int test, float pixel, float radius) 
     return Picture(viewFromObject(to_viewer, angle), pixel, radius, shift);
 }
 
+constexpr int kMaskViews = 7;
+
+// From where a mask direction's bit is found: its middle, and where its part of the sphere reaches
+// farthest, which is up to 17 degrees away. There up to six parts meet, and all of them look.
+std::vector<std::array<Vec3, kMaskViews>> maskViews() {
+    constexpr int kTried = 128 * kMaskDirections;
+    std::vector<std::vector<Vec3>> parts(kMaskDirections);
+    for (int i = 0; i < kTried; ++i) {  // a Fibonacci lattice
+        const float y = 1.0f - (2.0f * float(i) + 1.0f) / float(kTried),
+                    r = std::sqrt(1.0f - y * y);
+        const double turn = double(i) * 2.399963229728653;
+        const Vec3 direction(r * float(std::cos(turn)), y, r * float(std::sin(turn)));
+        parts[size_t(maskDirectionIndex(direction))].push_back(direction);
+    }
+    std::vector<std::array<Vec3, kMaskViews>> views(kMaskDirections);
+    for (size_t m = 0; m < views.size(); ++m) {
+        views[m][0] = maskDirectionOf(int(m));
+        std::vector<float> nearest(parts[m].size(), -1.0f);  // cosine to the nearest view
+        for (size_t v = 1; v < kMaskViews; ++v) {
+            for (size_t i = 0; i < nearest.size(); ++i)
+                nearest[i] = std::max(nearest[i], glm::dot(parts[m][i], views[m][v - 1]));
+            const auto farthest = std::min_element(nearest.begin(), nearest.end());
+            views[m][v] = parts[m][size_t(farthest - nearest.begin())];
+        }
+    }
+    return views;
+}
+
 class Builder {
 public:
     Builder(const RayCaster& caster, const std::vector<Material>& materials, double radius,
@@ -177,7 +205,7 @@ public:
 
     // Which mask directions see each block.
     void findMasks(const std::vector<SurfelFinish>& finishes, float pixel, SurfelLevel& level) {
-        constexpr int kViews = 7;  // within a direction's part of the sphere and a little beyond
+        static const std::vector<std::array<Vec3, kMaskViews>> views = maskViews();
         struct Seen {
             Vec3 position, normal;
             bool is_double_sided;
@@ -194,11 +222,7 @@ public:
             throwIfAsked();
             std::vector<uint8_t>& seen = seen_from[m];
             seen.assign(level.blocks.size(), 0);
-            for (int v = 0; v < kViews; ++v) {
-                const Vec3 middle = maskDirectionOf(int(m));
-                const Mat3 across = glm::transpose(viewFromObject(middle, float(v) * 1.0472f));
-                const Vec3 off = v == 0 ? Vec3(0.0f) : across[0] * 0.2f;
-                const Vec3 to_viewer = glm::normalize(middle + off);
+            for (const Vec3& to_viewer : views[m]) {
                 Picture picture(viewFromObject(to_viewer, 0.0f), pixel, radius_, Vec2(0.0f));
                 // Backs are left out when a model is drawn: they hide nothing. Where a surface has
                 // an opening one sees through them what lies beyond.

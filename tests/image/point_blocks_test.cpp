@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <render/build_model.h>
 #include <render/compare.h>
+#include <render/point_block_probe.h>
 #include <render/renderer.h>
 #include <scenegraph/io/surfel_file.h>
 #include <scenegraph/procedural/generators.h>
@@ -312,6 +313,43 @@ TEST(PointBlocks, backsHideNothingBehindThem) {
     }
     EXPECT_GT(covered, 150.0);
     EXPECT_LE(compareImages(points, rays, pool).holes->count, 4u);
+}
+
+// Masks know of a direction what is seen from where its part of the sphere ends.
+TEST(PointBlocks, masksHideNothingWhereTheirDirectionsMeet) {
+    constexpr int kPixels = 128;
+    ThreadPool pool(2);
+    const Pair pair = makePair(tree(), kPixels, pool);
+    Scene without = pair.model;
+    auto model = std::make_shared<SurfelModel>(*pair.model.meshes[0].surfels);
+    limitVisibility(*model, true, 0);
+    without.meshes[0].surfels = std::move(model);
+    Renderer masked(pair.model, pool), all(without, pool);
+    int lost = 0;
+    for (int m = 0; m < kMaskDirections; m += 3) {
+        Vec3 farthest = maskDirectionOf(m);
+        for (int i = 0; i < 4000; ++i) {
+            const float y = 1.0f - (2.0f * float(i) + 1.0f) / 4000.0f, turn = float(i) * 2.4f;
+            const float r = std::sqrt(1.0f - y * y);
+            const Vec3 d(r * std::cos(turn), y, r * std::sin(turn));
+            if (maskDirectionIndex(d) == m &&
+                glm::dot(d, maskDirectionOf(m)) < glm::dot(farthest, maskDirectionOf(m)))
+                farthest = d;
+        }
+        FrameRequest request;
+        request.camera = cameraTo(pair.source, farthest, kPixels, kPixels, 1.0);
+        request.settings.width = request.settings.height = kPixels;
+        request.settings.subpixels = 1;
+        request.settings.fill = false;
+        request.aovs = {"depth"};
+        const Image a = masked.render(request).image, b = all.render(request).image;
+        const int depth = a.channelIndex("depth");
+        for (int y = 0; y < kPixels; ++y) {
+            for (int x = 0; x < kPixels; ++x)
+                lost += a.pixel(x, y)[depth] > 1.02f * b.pixel(x, y)[depth];
+        }
+    }
+    EXPECT_EQ(lost, 0);
 }
 
 // Bit by bit, with and without leaving out what is hidden.
