@@ -365,6 +365,9 @@ void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
     const SurfelLevel& level = placed.level;
     // Discs with radii of their own cover all of the surface between them; what blends, less.
     const float side = level.spacing * placed.length_scale * (level.radius.empty() ? 1.0f : 0.5f);
+    // Samples that leave no hole are one and a half a square of their spacing.
+    const float share_of_square =
+        level.radius.empty() && placed.model.leaves_no_holes ? 0.65f : 1.0f;
     const Mat3 linear(placed.frame.camera_from_object.linear);
     PointBlock& out = block_;
     out.shapes = level.shapes.empty() ? nullptr : shapes_.data();
@@ -377,7 +380,7 @@ void SurfelPoints::addShapes(const Placed& placed, const SurfelBlock& b) {
                            (are_discs ? planes_[size_t(i)] : unpackNormal16(level.normal[k])));
         out.normal_x[i] = normal.x, out.normal_y[i] = normal.y, out.normal_z[i] = normal.z;
         const float share = level.radiusShare(k);
-        out.area[i] = side * side * share * share;
+        out.area[i] = share_of_square * side * side * share * share;
         if (out.shapes) {
             const Surfel& s = surfels_[size_t(i)];
             const float radius = level.spacing * share * placed.model.discSide() / kSidePerRadius;

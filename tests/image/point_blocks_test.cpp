@@ -315,6 +315,19 @@ TEST(PointBlocks, backsHideNothingBehindThem) {
     EXPECT_LE(compareImages(points, rays, pool).holes->count, 4u);
 }
 
+// Splats are no larger than what a point stands for, or both sides of a crease reach over it.
+TEST(PointBlocks, creasesOfWhatIsMagnifiedAreNarrowByEwa) {
+    ThreadPool pool(2);
+    const Pair pair = makePair(makePrimitive("box", 12, Vec3(0.8f, 0.5f, 0.3f)), 64, pool);
+    const Camera camera = cameraTo(pair.source, maskDirectionOf(3), 64, 256, 4.0);
+    const Image rays = draw(pair.source, camera, 256, Method::kRaycast, 9, pool, 1),
+                points =
+                    draw(pair.model, camera, 256, Method::kPoints, 1, pool, 1, Reconstruct::kEwa);
+    const CompareResult result = compareImages(points, rays, pool);
+    EXPECT_GT(result.psnr, 39.5);
+    EXPECT_LE(result.holes->count, 4u);
+}
+
 // Masks know of a direction what is seen from where its part of the sphere ends.
 TEST(PointBlocks, masksHideNothingWhereTheirDirectionsMeet) {
     constexpr int kPixels = 128;
