@@ -130,10 +130,10 @@ Picture testPicture(const Vec3& to_viewer, int test, float pixel, float radius) 
     return Picture(viewFromObject(to_viewer, angle), pixel, radius, shift);
 }
 
-constexpr int kMaskViews = 7;
+constexpr int kAroundMiddle = 7, kMaskViews = kAroundMiddle + 6;
 
-// From where a mask direction's bit is found: its middle, and where its part of the sphere reaches
-// farthest, which is up to 17 degrees away. There up to six parts meet, and all of them look.
+// From where a mask direction's bit is found: its middle, six places around it, and where its part
+// of the sphere reaches farthest, up to 17 degrees away. There up to six parts meet, and all look.
 std::vector<std::array<Vec3, kMaskViews>> maskViews() {
     constexpr int kTried = 128 * kMaskDirections;
     std::vector<std::vector<Vec3>> parts(kMaskDirections);
@@ -146,11 +146,16 @@ std::vector<std::array<Vec3, kMaskViews>> maskViews() {
     }
     std::vector<std::array<Vec3, kMaskViews>> views(kMaskDirections);
     for (size_t m = 0; m < views.size(); ++m) {
-        views[m][0] = maskDirectionOf(int(m));
+        const Vec3 middle = maskDirectionOf(int(m));
+        for (int v = 0; v < kAroundMiddle; ++v) {
+            const Mat3 across = glm::transpose(viewFromObject(middle, float(v) * 1.0472f));
+            views[m][size_t(v)] = v == 0 ? middle : glm::normalize(middle + across[0] * 0.2f);
+        }
         std::vector<float> nearest(parts[m].size(), -1.0f);  // cosine to the nearest view
         for (size_t v = 1; v < kMaskViews; ++v) {
             for (size_t i = 0; i < nearest.size(); ++i)
                 nearest[i] = std::max(nearest[i], glm::dot(parts[m][i], views[m][v - 1]));
+            if (v < kAroundMiddle) continue;
             const auto farthest = std::min_element(nearest.begin(), nearest.end());
             views[m][v] = parts[m][size_t(farthest - nearest.begin())];
         }
