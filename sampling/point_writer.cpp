@@ -71,15 +71,12 @@ void PointWriter::add(const InstanceFrame& frame, const ListName& name, const Ru
         piece.count = int(n);
         run.first_index = first;
         if (n_ahead_ == kAhead) drawNext();
-        piece.block =
-            &context_.lists.points(name, first, int(n), list_length, scratch_, piece.lane);
-        run.block = piece.block == &scratch_ ? nullptr : piece.block;
-        ahead_[(first_ahead_ + n_ahead_++) % kAhead] = piece;
-        if (run.block) {
-            prefetch(piece);
-        } else {
-            drawAhead();
-        }
+        const size_t place = size_t((first_ahead_ + n_ahead_++) % kAhead);
+        ListBlock& scratch = scratch_[place];
+        piece.block = &context_.lists.points(name, first, int(n), list_length, scratch, piece.lane);
+        run.block = piece.block == &scratch ? nullptr : piece.block;
+        ahead_[place] = piece;
+        prefetch(piece);
         first += n;
         count -= n;
     }
@@ -97,10 +94,6 @@ void PointWriter::prefetch(const Piece& piece) {
     for (const auto& axis : block.position) read(axis);
     for (const auto& axis : block.normal) read(axis);
     read(block.single_sided);
-}
-
-void PointWriter::drawAhead() {
-    while (n_ahead_ > 0) drawNext();
 }
 
 // The first of those read ahead.
@@ -159,7 +152,7 @@ uint32_t PointWriter::firstOf(uint64_t path, uint32_t count, uint32_t length) co
 }
 
 void PointWriter::flush() {
-    drawAhead();
+    while (n_ahead_ > 0) drawNext();
     handOver();
 }
 

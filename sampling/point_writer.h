@@ -45,7 +45,6 @@ private:
     };
     static void prefetch(const Piece& piece);
     void drawNext();
-    void drawAhead();
     void handOver();
     bool markBlended(const ListBlock& list, int lane, int count, bool wants_layers,
                      const ListName& name, uint32_t first);
@@ -56,8 +55,8 @@ private:
     // Pieces that wait until their points have come from memory: a ring.
     static constexpr int kAhead = 4;
     std::array<Piece, kAhead> ahead_;
+    std::array<ListBlock, kAhead> scratch_;  // of points that are in no list
     int first_ahead_ = 0, n_ahead_ = 0;
-    ListBlock scratch_;
 };
 
 }  // namespace stipple
