@@ -478,6 +478,17 @@ Vec3 normalAt(const TileContext& context, const SurfelModel& model, const Surfel
     return bentNormal(level, s, model.discSide(), Vec3(glm::inverse(to_camera.linear) * offset));
 }
 
+// What stands out over a silhouette is splats that turn away from the eye there. Shading would turn
+// their normals to the eye, and light them from the wrong side: they are lit as the silhouette is.
+// Surface that is seen from behind turns away by more, but at grazing angles.
+constexpr float kRimCosine = 0.5f;
+
+Vec3 atSilhouette(const Vec3& normal, const Vec3& to_eye) {
+    const float cosine = glm::dot(normal, to_eye);
+    if (cosine >= 0.0f || cosine < -kRimCosine) return normal;
+    return glm::normalize(normal - to_eye * (cosine - 1e-3f));
+}
+
 }  // namespace
 
 void surfelAttributes(const TileContext& context, const Mat3& world_from_camera, const Run& run,
@@ -498,6 +509,12 @@ void surfelAttributes(const TileContext& context, const Mat3& world_from_camera,
     sample.object = objectId(run.path);
     const Vec3 normal = normalAt(context, *mesh.surfels, level, run, index, sample.position_camera);
     sample.normal_world = glm::normalize(world_from_camera * (run.camera_from_normal * normal));
+    if (run.frame != kNoFrame) {
+        const Vec3 to_eye = context.view.orthographic
+                                ? -world_from_camera[2]
+                                : glm::normalize(world_from_camera * -sample.position_camera);
+        sample.normal_world = atSilhouette(sample.normal_world, to_eye);
+    }
 }
 
 }  // namespace stipple
