@@ -491,8 +491,8 @@ Vec3 atSilhouette(const Vec3& normal, const Vec3& to_eye) {
 
 }  // namespace
 
-void surfelAttributes(const TileContext& context, const Mat3& world_from_camera, const Run& run,
-                      uint32_t index, SurfaceSample& sample) {
+void surfelAttributes(const TileContext& context, const Run& run, uint32_t index,
+                      SurfaceSample& sample) {
     const Scene& scene = context.scene;
     const Mesh& mesh = scene.meshes[run.child.index()];
     const SurfelLevel& level = mesh.surfels->levels[size_t(run.surfel_level)];
@@ -507,6 +507,7 @@ void surfelAttributes(const TileContext& context, const Mat3& world_from_camera,
     sample.patch_width =
         std::max(mesh.surfels->finishes[finish].patch_width, side) * run.length_scale;
     sample.object = objectId(run.path);
+    const Mat3& world_from_camera = context.view.world_from_camera;
     const Vec3 normal = normalAt(context, *mesh.surfels, level, run, index, sample.position_camera);
     sample.normal_world = glm::normalize(world_from_camera * (run.camera_from_normal * normal));
     if (run.frame != kNoFrame) {

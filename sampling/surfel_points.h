@@ -46,7 +46,7 @@ private:
 };
 
 // Attributes of a surfel of a run (Run::surfel_level) at sample.position_camera.
-void surfelAttributes(const TileContext& context, const Mat3& world_from_camera, const Run& run,
-                      uint32_t index, SurfaceSample& sample);
+void surfelAttributes(const TileContext& context, const Run& run, uint32_t index,
+                      SurfaceSample& sample);
 
 }  // namespace stipple

@@ -19,8 +19,7 @@ TileCut::TileCut(const Scene& scene, const View& view, const RenderSettings& set
       points_(context_),
       group_points_(context_, points_),
       triangles_(context_),
-      surfels_(context_),
-      world_from_camera_(glm::transpose(view.camera_from_world)) {}
+      surfels_(context_) {}
 
 void TileCut::emit(const Batch& batch, PointSink& sink) {
     const PlannedNode& planned = plan_.nodes[batch.index];
@@ -41,7 +40,7 @@ void TileCut::attributes(uint32_t number, float sub_x, float sub_y, SurfaceSampl
     const Run& run = context_.runOf(number);
     if (run.surfel_level >= 0) {
         const uint32_t place = (number % kBlockPoints) >> run.numbers_per_surfel_shift;
-        surfelAttributes(context_, world_from_camera_, run, run.first_index + place, sample);
+        surfelAttributes(context_, run, run.first_index + place, sample);
         return;
     }
     const uint32_t index = run.first_index + number % kBlockPoints;

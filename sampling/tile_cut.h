@@ -56,7 +56,6 @@ private:
     GroupPoints group_points_;
     TriangleWriter triangles_;
     SurfelPoints surfels_;
-    const Mat3 world_from_camera_;
     std::vector<Opened> opened_;  // a stack: each opening uses its end
 };
 
