@@ -84,8 +84,7 @@ STIPPLE_VECTOR_CLONES void gradientSky(const Sky& sky, const Mat3& world_from_ca
         const float px = xx * x[i] + yx + zx, py = xy * x[i] + yy + zy, pz = xz * x[i] + yz + zz;
         const float up = py * (1.0f / std::sqrt(px * px + py * py + pz * pz));
         const bool is_below = up < 0.0f;
-        const float below = std::min(1.0f, -up * 5.7f), above = std::sqrt(std::max(up, 0.0f));
-        const float t = is_below ? below : above;
+        const float t = skyShare(up);
         red[i] = h.x * (1.0f - t) + (is_below ? g.x : z.x) * t;
         green[i] = h.y * (1.0f - t) + (is_below ? g.y : z.y) * t;
         blue[i] = h.z * (1.0f - t) + (is_below ? g.z : z.z) * t;

@@ -133,11 +133,8 @@ Brdf evaluateBrdf(const Vec3& albedo, const SurfaceFinish& finish, const Vec3& n
 
 Vec3 skyRadiance(const Sky& sky, const Vec3& direction) {
     if (sky.environment) return environmentRadiance(*sky.environment, direction);
-    if (direction.y < 0.0f) {
-        // A soft horizon: ground's colour is reached 10 degrees below it.
-        return glm::mix(sky.horizon, sky.ground, std::min(1.0f, -direction.y * 5.7f));
-    }
-    return glm::mix(sky.horizon, sky.zenith, std::sqrt(direction.y));
+    return glm::mix(sky.horizon, direction.y < 0.0f ? sky.ground : sky.zenith,
+                    skyShare(direction.y));
 }
 
 namespace {

@@ -12,6 +12,9 @@
 #include <core/material.h>
 #include <core/surface.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace stipple {
 
 // Radiance towards the eye, linear. The sample's normal is turned towards the viewer for
@@ -30,6 +33,14 @@ struct Brdf {
 };
 Brdf evaluateBrdf(const Vec3& albedo, const SurfaceFinish& finish, const Vec3& normal,
                   const Vec3& to_light, const Vec3& to_eye);
+
+// Of a sky without an environment: the share of the zenith's colour or, below the horizon, the
+// ground's, where the rest is the horizon's. up: height of the direction, unit. Vectorizes.
+inline float skyShare(float up) {
+    // A soft horizon: ground's colour is reached 10 degrees below it.
+    const float below = std::min(1.0f, -up * 5.7f), above = std::sqrt(std::max(up, 0.0f));
+    return up < 0.0f ? below : above;
+}
 
 // Radiance of the sky in a (world space, unit) direction.
 Vec3 skyRadiance(const Sky& sky, const Vec3& direction_world);
