@@ -34,7 +34,6 @@ std::vector<std::string> channelNames(const std::vector<std::string>& aovs) {
 Picture::Picture(const View& view, const Lighting& lighting, const std::vector<std::string>& aovs,
                  bool transparent)
     : view_(view),
-      world_from_camera_(glm::transpose(view.camera_from_world)),
       lighting_(lighting),
       transparent_(transparent),
       exposure_(std::exp2(lighting.exposure)),
@@ -100,14 +99,14 @@ void Picture::findSky(int x, int y, SkyRow& sky) const {
     Vec3 origin, direction;
     view_.ray(0.0f, (float(y) + 0.5f) * float(view_.subpixels), origin, direction);
     if (!lighting_.sky.environment) {
-        gradientSky(lighting_.sky, world_from_camera_, ray_x_.data() + x, direction.y, sky.count,
-                    sky.red.data(), sky.green.data(), sky.blue.data());
+        gradientSky(lighting_.sky, view_.world_from_camera, ray_x_.data() + x, direction.y,
+                    sky.count, sky.red.data(), sky.green.data(), sky.blue.data());
         return;
     }
     for (int i = 0; i < sky.count; ++i) {
         direction.x = ray_x_[size_t(x + i)];
         const Vec3 radiance =
-            skyRadiance(lighting_.sky, glm::normalize(world_from_camera_ * direction));
+            skyRadiance(lighting_.sky, glm::normalize(view_.world_from_camera * direction));
         sky.red[size_t(i)] = radiance.x;
         sky.green[size_t(i)] = radiance.y;
         sky.blue[size_t(i)] = radiance.z;

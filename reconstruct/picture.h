@@ -76,7 +76,6 @@ private:
 
     View view_;
     std::vector<float> ray_x_;  // of rays through the middles of pixels of a column, camera space
-    Mat3 world_from_camera_;
     Lighting lighting_;
     bool transparent_;
     float exposure_;
