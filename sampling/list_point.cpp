@@ -16,10 +16,6 @@ double listPosition(const PointKey& key) {
     return t - std::floor(t);
 }
 
-double positionResolution(Sampler sampler) {
-    return sampler == Sampler::kRandom ? 0x1p-50 : 0x1p-12;
-}
-
 template <class T>
 MeshPoint meshPointAt(const std::vector<T>& cumulative_area, const MeshNode& node, double position,
                       const PointKey& key) {
@@ -77,8 +73,7 @@ template MeshPoint meshPointAt(const std::vector<float>&, const MeshNode&, doubl
 InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node_index,
                          double position) {
     const GroupNode* node = &group.nodes[node_index];
-    const double total = node->area;
-    double target = position * total;
+    double target = position * node->area;
     for (bool is_found = false; !is_found;) {
         is_found = true;
         double residents = node->area;
@@ -101,9 +96,75 @@ InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node_i
         const ChildRef child = group.instances.child(i);
         const double area = childArea(scene, child) * group.instances.areaScale(i);
         if (target < area || i + 1 >= end)
-            return {i, area > 0.0 ? std::clamp(target / area, 0.0, 0x1.fffffep-1) : 0.0,
-                    area / std::max(total, 1e-300)};
+            return {i, area > 0.0 ? std::clamp(target / area, 0.0, 0x1.fffffep-1) : 0.0};
         target -= area;
+    }
+}
+
+namespace {
+
+double areaOf(const Scene& scene, const Group& group, uint32_t instance) {
+    return childArea(scene, group.instances.child(instance)) * group.instances.areaScale(instance);
+}
+
+}  // namespace
+
+Branches::Branches(const Scene& scene, const Group& group, uint32_t node_index) {
+    const GroupNode& node = group.nodes[node_index];
+    for (uint32_t c = 0; c < node.child_count; ++c)
+        area[c] = group.nodes[node.first_child + c].area;
+    for (uint32_t i = node.first; i < node.first + node.resident_count; ++i)
+        area[codeOfResident(group.listed_index[i])] += areaOf(scene, group, i);
+    for (const double a : area) sum += a;
+}
+
+uint8_t Branches::at(double u) const {
+    double target = u * sum;
+    uint8_t last = 0;
+    for (uint8_t code = 0; code < std::size(area); ++code) {
+        if (!(area[code] > 0.0)) continue;
+        last = code;
+        if (target < area[code]) break;
+        target -= area[code];
+    }
+    return last;
+}
+
+namespace {
+
+// A reservoir of one: each takes the place of those before it with the share that it adds to them.
+// From the last on, as the first of these to do so is the one. sum: of their areas.
+uint32_t chooseResident(const Scene& scene, const Group& group, const GroupNode& node, uint8_t code,
+                        double sum, uint64_t hash) {
+    uint32_t chosen = node.first;
+    for (uint32_t i = node.first + node.resident_count; i-- > node.first;) {
+        if (Branches::codeOfResident(group.listed_index[i]) != code) continue;
+        const double area = areaOf(scene, group, i);
+        if (!(area > 0.0)) continue;
+        chosen = i;
+        if (uniformDouble(hashCombine(hash, group.listed_index[i])) * sum < area) break;
+        sum -= area;
+    }
+    return chosen;
+}
+
+}  // namespace
+
+ChosenInstance chooseInstance(const Scene& scene, const Group& group, uint32_t node, double u,
+                              uint64_t hash) {
+    ChosenInstance result;
+    for (bool is_first = true;; is_first = false) {
+        const Branches branches(scene, group, node);
+        const uint8_t code = branches.at(u);
+        if (is_first) result.branch = code;
+        if (!Branches::isChild(code)) {
+            result.instance = chooseResident(scene, group, group.nodes[node], code,
+                                             branches.area[code], mixBits(hash));
+            return result;
+        }
+        node = group.nodes[node].first_child + code;
+        hash = hashCombine(hash, node);
+        u = uniformDouble(hash);
     }
 }
 

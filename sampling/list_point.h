@@ -20,9 +20,6 @@ struct PointKey {
 // Where point `index` lies along the cumulated areas, in [0, 1): van der Corput, scrambled and
 // shifted at random, or random.
 double listPosition(const PointKey& key);
-// Positions of a list's points are this far apart, or random in no more digits than this.
-double positionResolution(Sampler sampler);
-
 // Where on a mesh a point lies.
 struct MeshPoint {
     uint32_t triangle = 0;
@@ -40,11 +37,40 @@ MeshPoint meshPointAt(const std::vector<T>& cumulative_area, const MeshNode& nod
 struct InstancePoint {
     uint32_t instance = 0;
     double position = 0.0;  // along the areas of its child, in [0, 1)
-    double share = 1.0;     // of the node's area
 };
 
 // The instance at `position`, in [0, 1), along the areas (each the child's times the transform's
 // largest area scale) below a node. O(log n).
 InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node, double position);
+
+// Where one may go on from a group's node: to a child, or to the residents of one of eight kinds,
+// by their names. Their codes: the child's number, or eight and the kind.
+struct Branches {
+    static constexpr uint8_t kChildren = 8, kKinds = 8;
+    static uint8_t codeOfResident(uint32_t listed_index) {
+        return uint8_t(kChildren + listed_index % kKinds);
+    }
+    static bool isChild(uint8_t code) { return code < kChildren; }
+
+    // O(children + residents).
+    Branches(const Scene& scene, const Group& group, uint32_t node);
+    // One of them, in proportion to their areas, by u, uniform in [0, 1).
+    uint8_t at(double u) const;
+
+    double area[kChildren + kKinds] = {};  // by code
+    double sum = 0.0;
+};
+
+struct ChosenInstance {
+    uint32_t instance = 0;  // its place in the InstanceStore
+    uint8_t branch = 0;     // of the node where the way begins
+};
+
+// An instance below a node, in proportion to areas as instanceAt(), by a random number for each
+// node and instance on the way: made of `hash` and what names them, but for the first, u. Where
+// areas change, so do few of the choices: of those that fell elsewhere about the share of the
+// change in the sum. O(log n + residents).
+ChosenInstance chooseInstance(const Scene& scene, const Group& group, uint32_t node, double u,
+                              uint64_t hash);
 
 }  // namespace stipple

@@ -1,39 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sampling/point_list.h>
 
-#include <core/image.h>
-#include <core/octahedral.h>
-#include <core/rng.h>
-#include <scenegraph/object_id.h>
-#include <scenegraph/surface_at.h>
-
 #include <algorithm>
-#include <array>
-#include <cstring>
-#include <map>
 #include <numeric>
 #include <utility>
 
 namespace stipple {
-
-uint32_t packOctahedral(const Vec3& n) {
-    const Vec2 p = octahedralOf(n);
-    const auto q = [](float v) { return uint32_t(std::lround((v * 0.5f + 0.5f) * 65535.0f)); };
-    return q(p.x) | q(p.y) << 16;
-}
-
-Vec3 unpackOctahedral(uint32_t packed) {
-    constexpr float kStep = 2.0f / 65535.0f;
-    return octahedralNormal(float(packed & 0xffff) * kStep - 1.0f,
-                            float(packed >> 16) * kStep - 1.0f);
-}
-
-uint32_t packPlace(Vec2 uv) {
-    const auto q = [](float v) { return uint32_t(std::clamp(v, 0.0f, 1.0f) * 65535.0f + 0.5f); };
-    return q(uv.x) | q(uv.y) << 16;
-}
-
-Vec2 unpackPlace(uint32_t p) { return Vec2(p & 0xffff, p >> 16) / 65535.0f; }
 
 PointLists::List PointLists::List::make(uint32_t block_count) {
     List list;
@@ -68,6 +40,7 @@ PointLists::PointLists(const Scene& scene)
     for (size_t g = 0; g < scene.groups.size(); ++g) {
         const Group& group = scene.groups[g];
         group_slots_.emplace_back(uses[g] >= kOften ? group.nodes.size() : 0);
+        edits_.names.push_back(uses[g] >= kOften ? group.listed_index : std::vector<uint32_t>());
     }
     for (const Group& group : scene.groups) is_deep_.push_back(group.depth > 1);
     findStale();
@@ -96,6 +69,7 @@ void PointLists::findStale() {
 
 PointLists::~PointLists() {
     forEachSlot([](Slot& slot) { slot.list.load().destroy(); });
+    dropOutdated();
     freeRetired();
     for (auto& seen : seen_) delete seen.load();
 }
@@ -221,17 +195,29 @@ void PointLists::freeRetired() {
     bytes_ -= std::exchange(retired_bytes_, 0);
 }
 
-void PointLists::dropEdited(const ListName& name) {
+void PointLists::putAside(const ListName& name, bool is_whole) {
     Slot& slot = slotOf(name);
-    const List list = slot.list.load();
-    if (!list.isNull() && slot.last_used.load() == frame_)
-        dropped_.push_back({name, list.blockCount()});
-    drop(slot);
+    if (slot.last_used.load() != frame_) {
+        drop(slot);
+        return;
+    }
+    const List list = slot.list.exchange(List());
+    if (list.isNull()) return;
+    bytes_ -= list.blockCount() * sizeof(ListBlock);
+    outdated_.push_back({name, list, is_whole});
 }
 
-void PointLists::dropGroup(uint32_t group) {
+void PointLists::putGroupAside(uint32_t group) {
+    for (Outdated& outdated : outdated_)
+        outdated.is_whole |= outdated.name.child == ChildRef::group(group);
     Slots& slots = group_slots_[group];
-    for (uint32_t node = 0; node < slots.size(); ++node) dropEdited({ChildRef::group(group), node});
+    for (uint32_t node = 0; node < slots.size(); ++node)
+        putAside({ChildRef::group(group), node}, true);
+}
+
+void PointLists::dropOutdated() {
+    for (Outdated& outdated : outdated_) outdated.list.destroy();
+    outdated_.clear();
 }
 
 void PointLists::sceneChanged(const SceneChanges& changes) {
@@ -240,6 +226,7 @@ void PointLists::sceneChanged(const SceneChanges& changes) {
         mesh_slots_.emplace_back(scene_.meshes[mesh_slots_.size()].nodes.size());
     // What has come since is instanced too seldom to have lists.
     while (group_slots_.size() < n_groups) group_slots_.emplace_back(0);
+    edits_.names.resize(n_groups);
     resizeAtomics(seen_, scene_.meshes.size() * kDirections);
     resizeAtomics(factor_of_, n_groups);
     std::vector<uint32_t> changed = changes.groups, whole = changes.whole_groups;
@@ -257,14 +244,19 @@ void PointLists::sceneChanged(const SceneChanges& changes) {
         // Points name their instances otherwise then.
         if (is_deep_[group] != (scene_.groups[group].depth > 1)) {
             is_deep_[group].flip();
-            dropGroup(group);
+            putGroupAside(group);
         }
     }
-    for (const uint32_t group : whole) dropGroup(group);
-    for (const SceneChanges::Node& changed_node : changes.nodes) {
-        if (changed_node.node < group_slots_[changed_node.group].size())
-            dropEdited({ChildRef::group(changed_node.group), changed_node.node});
+    for (const uint32_t group : whole) {
+        putGroupAside(group);
+        if (!group_slots_[group].empty()) edits_.names[group] = scene_.groups[group].listed_index;
     }
+    for (const SceneChanges::Node& changed_node : changes.nodes) {
+        edits_.nodes.emplace(changed_node.group, changed_node.node);
+        if (changed_node.node < group_slots_[changed_node.group].size())
+            putAside({ChildRef::group(changed_node.group), changed_node.node}, false);
+    }
+    for (const InstanceId& id : changes.instances) edits_.instances.emplace(id.group, id.index);
     for (const uint32_t group : changed) {
         Slots& slots = group_slots_[group];
         const size_t n = scene_.groups[group].nodes.size();
@@ -299,35 +291,66 @@ void PointLists::startFrame(const ListIdentity& identity, size_t budget_bytes, T
         delete place.exchange(nullptr);
     }
     ++frame_;
-    if (is_new) dropped_.clear();
-    remakeDropped(pool);
+    if (is_new) dropOutdated();
+    updateOutdated(pool);
 }
 
 // One block after the other, so that all threads share the work of a list.
-void PointLists::remakeDropped(ThreadPool& pool) {
+void PointLists::updateOutdated(ThreadPool& pool) {
     struct Job {
-        ListName name;
-        ListBlock* out;
+        const Outdated* outdated;
         uint32_t block;
     };
     std::vector<Job> jobs;
-    for (const auto& [name, block_count] : std::exchange(dropped_, {})) {
+    for (Outdated& outdated : outdated_) {
+        const ListName& name = outdated.name;
         Slot& slot = slotOf(name);
+        const uint32_t block_count = outdated.list.blockCount();
         const std::vector<GroupNode>& nodes = scene_.groups[name.child.index()].nodes;
         // A group that was built anew may have fewer.
         if (name.node >= nodes.size() || !(nodes[name.node].area > 0.0) ||
             !slot.list.load().isNull() || !hasLists(name.child) ||
-            !takeBudget(block_count * sizeof(ListBlock)))
+            !takeBudget(block_count * sizeof(ListBlock))) {
+            outdated.list.destroy();
             continue;
-        const List list = List::make(block_count);
-        for (uint32_t b = 0; b < block_count; ++b) jobs.push_back({name, list.blocks() + b, b});
-        slot.list = list;
+        }
+        slot.list = outdated.list;
         slot.last_used = frame_;
+        for (uint32_t b = 0; b < block_count; ++b) jobs.push_back({&outdated, b});
     }
     pool.forEach(jobs.size(), [&](size_t i, int) {
-        const Job& job = jobs[i];
-        makePoints(job.name, job.block * kBlockPoints, kBlockPoints, *job.out);
+        const auto [outdated, b] = jobs[i];
+        ListBlock& block = outdated->list.blocks()[b];
+        const ListSource source = sourceOf(outdated->name);
+        if (outdated->is_whole) {
+            makeListPoints(source, b * kBlockPoints, kBlockPoints, block);
+        } else {
+            remakeListPoints(source, edits_, b * kBlockPoints, block);
+        }
     });
+    outdated_.clear();
+    updateNames();
+}
+
+// As lists that are made from now on find them.
+void PointLists::updateNames() {
+    for (const auto& [g, n] : std::exchange(edits_.nodes, {})) {
+        if (group_slots_[g].empty()) continue;
+        const Group& group = scene_.groups[g];
+        std::vector<uint32_t>& names = edits_.names[g];
+        names.resize(group.listed_index.size());
+        if (n >= group.nodes.size()) continue;
+        const GroupNode& node = group.nodes[n];
+        std::copy_n(group.listed_index.begin() + node.first, node.resident_count,
+                    names.begin() + node.first);
+    }
+    edits_.instances.clear();
+}
+
+ListSource PointLists::sourceOf(const ListName& name) {
+    const bool is_whole = name.direction == ListName::kWhole;
+    return {scene_, identity_, name,
+            is_whole ? nullptr : &visibleArea(name.child.index(), name.direction)};
 }
 
 bool PointLists::takeBudget(size_t bytes) {
@@ -335,189 +358,6 @@ bool PointLists::takeBudget(size_t bytes) {
     bytes_ -= bytes;
     is_full_.store(true, std::memory_order_relaxed);
     return false;
-}
-
-namespace {
-
-// A point before it is quantized, in the space of its node.
-struct Point {
-    Vec3 position = Vec3(0);
-    DVec3 normal = DVec3(0);   // geometric; length: the density it deserves over that of its list
-    bool is_textured = false;  // looked up by `at`, else:
-    Vec3 shading_normal = Vec3(0), albedo = Vec3(0);  // of the node's space
-    MeshPoint at;
-    float patch_width = 0.0f;
-    bool single_sided = false;
-    uint8_t alpha = 255;
-    uint16_t material = 0;
-    uint32_t instance = 0;
-    uint8_t levels = 1;
-};
-
-template <class T>
-Point makeMeshPoint(const Scene& scene, const Mesh& mesh, const std::vector<T>& cumulative_area,
-                    const MeshNode& node, double position, const PointKey& key, bool layers) {
-    const MeshPoint at = meshPointAt(cumulative_area, node, position, key);
-    const UVec3& t = mesh.triangles[at.triangle];
-    const Vec3 a = mesh.positions[t.x], e1 = mesh.positions[t.y] - a, e2 = mesh.positions[t.z] - a;
-    const Stratum& stratum = mesh.strata[mesh.triangle_stratum[at.triangle]];
-    Point p;
-    p.position = a + e1 * at.u + e2 * at.v;
-    p.at = at;
-    p.patch_width = stratum.patch_width;
-    p.single_sided = !stratum.double_sided;
-    p.material = mesh.triangle_material[at.triangle];
-    const Material& material = scene.materials[p.material];
-    p.is_textured = material.isTextured();
-    if (!p.is_textured) {
-        const MeshSurface surface =
-            surfaceAt(mesh, scene.materials, scene.textures, at.triangle, at.u, at.v, {});
-        p.shading_normal = surface.normal_object;
-        p.albedo = surface.albedo;
-    }
-    bool is_there = true;
-    if (material.alpha_mode != AlphaMode::kOpaque) {
-        const float alpha = alphaAt(mesh, scene.materials, scene.textures, at.triangle, at.u, at.v);
-        if (material.alpha_mode == AlphaMode::kMask) {
-            is_there = alpha >= material.alpha_cutoff;
-        } else if (layers) {
-            p.alpha = uint8_t(std::clamp(alpha, 0.0f, 1.0f) * 255.0f + 0.5f);
-            is_there = p.alpha > 0;
-        } else {
-            is_there = uniformFloat(hashCombine(key.list, key.index, 3)) < alpha;
-        }
-    }
-    if (is_there) p.normal = glm::normalize(glm::cross(DVec3(e1), DVec3(e2)));
-    return p;
-}
-
-// Places on a triangle that are tried for one that a mask lets stand.
-constexpr uint64_t kMaskAttempts = 8;
-
-// Surface of groups within groups is looked at from so far that a point stands for its patch: its
-// colour there, whatever texture it has.
-void prefilter(const Scene& scene, const Mesh& mesh, Point& p) {
-    if (!p.is_textured) return;
-    LookupBeam beam;
-    beam.diameter = p.patch_width;
-    beam.direction = Vec3(p.normal);
-    const MeshSurface surface =
-        surfaceAt(mesh, scene.materials, scene.textures, p.at.triangle, p.at.u, p.at.v, beam);
-    p.shading_normal = surface.normal_object;
-    p.albedo = surface.albedo;
-    p.is_textured = false;
-}
-
-// Positions known no better than to this share of what they run along are not random there.
-constexpr double kCoarsePosition = 1.0 / 16;
-
-Point makeGroupPoint(const Scene& scene, const Group& outermost, uint32_t node, const PointKey& key,
-                     bool layers) {
-    const Group* group = &outermost;
-    InstancePoint at = instanceAt(scene, *group, node, listPosition(key));
-    ChildRef child = group->instances.child(at.instance);
-    Affine group_from_mesh = group->instances.groupFromChild(at.instance);
-    // Sums go by the product of what each level's transform does to areas at most.
-    double area_scale = group->instances.areaScale(at.instance);
-    uint64_t path = extendObjectPath(0, group->listed_index[at.instance]);
-    int levels = 1;
-    // Each level uses up digits of the position: where none are left, more are drawn.
-    double resolution = positionResolution(key.sampler) / std::max(at.share, 1e-12);
-    for (; child.isGroup(); ++levels) {
-        group = &scene.groups[child.index()];
-        if (resolution > kCoarsePosition) {
-            at.position = uniformDouble(hashCombine(key.list, key.index, uint64_t(levels), 8));
-            resolution = positionResolution(Sampler::kRandom);
-        }
-        at = instanceAt(scene, *group, 0, at.position);
-        resolution /= std::max(at.share, 1e-12);
-        child = group->instances.child(at.instance);
-        group_from_mesh = group_from_mesh * group->instances.groupFromChild(at.instance);
-        area_scale *= group->instances.areaScale(at.instance);
-        path = extendObjectPath(path, group->listed_index[at.instance]);
-    }
-    if (resolution > kCoarsePosition && levels > 1)
-        at.position = uniformDouble(hashCombine(key.list, key.index, uint64_t(levels), 8));
-    area_scale = std::max(area_scale, 1e-30);
-    const Mesh& mesh = scene.meshes[child.index()];
-    const float length_scale = float(std::sqrt(area_scale));
-    Point p =
-        makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], at.position, key, layers);
-    if (outermost.depth > 1) prefilter(scene, mesh, p);
-    // Drawn for the largest area scale of the transform; this orientation's may be smaller.
-    DMat3 area_map = cofactor(group_from_mesh.linear);
-    area_map *= (glm::dot(group_from_mesh.linear[0], area_map[0]) < 0.0 ? -1.0 : 1.0) / area_scale;
-    p.position = Vec3(group_from_mesh.point(DVec3(p.position)));
-    p.normal = area_map * p.normal;
-    const DVec3 shading = area_map * DVec3(p.shading_normal);
-    p.shading_normal = Vec3(shading / std::max(glm::length(shading), 1e-30));
-    p.patch_width *= length_scale;
-    p.instance = outermost.depth > 1 ? uint32_t(path) : at.instance;
-    p.levels = uint8_t(std::min(levels, 255));
-    return p;
-}
-
-// An alpha mask may say that there is nothing.
-bool isThere(const Point& p) { return p.normal != DVec3(0.0); }
-
-void writePoint(const Point& p, const Box3& box, int lane, ListBlock& out) {
-    const Vec3 extent = box.extent();
-    for (int axis = 0; axis < 3; ++axis) {
-        const float q =
-            extent[axis] > 0.0f ? (p.position[axis] - box.min[axis]) / extent[axis] : 0.0f;
-        out.position[axis][lane] = uint16_t(std::clamp(q, 0.0f, 1.0f) * 65535.0f + 0.5f);
-        out.normal[axis][lane] = int16_t(std::lround(p.normal[axis] * 32767.0));
-    }
-    out.width[lane] = isThere(p) ? patchWidthCode(p.patch_width, kFirstMetreExponent) : kNoPatch;
-    out.single_sided[lane] = p.single_sided;
-    out.alpha[lane] = p.alpha;
-    out.normal_or_triangle[lane] = p.is_textured ? p.at.triangle : packOctahedral(p.shading_normal);
-    out.albedo_or_place[lane] = p.is_textured ? packPlace({p.at.u, p.at.v}) : packSrgb8(p.albedo);
-    out.material[lane] = p.material;
-    out.instance[lane] = p.instance;
-    out.levels[lane] = p.levels;
-}
-
-}  // namespace
-
-void PointLists::makePoints(const ListName& name, uint32_t first, int count, ListBlock& out) {
-    const Box3& box = nodeBounds(scene_, name.child, name.node);
-    const bool layers = identity_.layers;
-    const bool is_whole = name.direction == ListName::kWhole;
-    PointKey key{identity_.sampler, hashCombine(identity_.seed, name.child.bits, name.node), first};
-    if (!is_whole) key.list = hashCombine(key.list, uint64_t(name.direction), 6);
-    const auto makeAll = [&](const auto& make) {
-        for (int lane = 0; lane < count; ++lane, ++key.index) writePoint(make(), box, lane, out);
-    };
-    if (name.child.isGroup()) {
-        const Group& group = scene_.groups[name.child.index()];
-        makeAll([&] { return makeGroupPoint(scene_, group, name.node, key, layers); });
-        return;
-    }
-    const Mesh& mesh = scene_.meshes[name.child.index()];
-    const MeshNode& node = mesh.nodes[name.node];
-    const auto makeOn = [&](const auto& cumulative_area) {
-        makeAll([&] {
-            return makeMeshPoint(scene_, mesh, cumulative_area, node, listPosition(key), key,
-                                 layers);
-        });
-    };
-    if (is_whole) {
-        makeOn(mesh.cumulative_area);
-        return;
-    }
-    const VisibleArea& visible = visibleArea(name.child.index(), name.direction);
-    makeAll([&] {
-        Point p;
-        // What was seen of a masked triangle is surface.
-        for (uint64_t attempt = 0; attempt < kMaskAttempts && !isThere(p); ++attempt) {
-            PointKey k = key;
-            if (attempt > 0) k.list = hashCombine(key.list, attempt);
-            p = makeMeshPoint(scene_, mesh, visible.cumulative, node, listPosition(key), k, layers);
-        }
-        p.patch_width = visible.patch_width;
-        return p;
-    });
 }
 
 PointLists::List PointLists::grow(Slot& slot, const ListName& name, uint32_t n_blocks) {
@@ -528,9 +368,10 @@ PointLists::List PointLists::grow(Slot& slot, const ListName& name, uint32_t n_b
     const uint32_t capacity = std::bit_ceil(n_blocks);
     if (!takeBudget(capacity * sizeof(ListBlock))) return List();
     const List list = List::make(capacity);
+    const ListSource source = sourceOf(name);
     std::copy_n(old.blocks(), have, list.blocks());
     for (uint32_t b = have; b < capacity; ++b)
-        makePoints(name, b * kBlockPoints, kBlockPoints, list.blocks()[b]);
+        makeListPoints(source, b * kBlockPoints, kBlockPoints, list.blocks()[b]);
     slot.list.store(list, std::memory_order_release);
     if (have > 0) {
         // Other threads may still read it; it goes when the frame is over.
@@ -557,7 +398,7 @@ const ListBlock& PointLists::points(const ListName& name, uint32_t first, int co
             return list.blocks()[block];
         }
     }
-    makePoints(name, first, count, scratch);
+    makeListPoints(sourceOf(name), first, count, scratch);
     first_lane = 0;
     return scratch;
 }

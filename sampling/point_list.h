@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The points of a node of a mesh, or of a group that is instanced often: an endless sequence, each
-// point a pure function of (seed, mesh or group, node, index), and a cache of the sequences'
-// beginnings. With the stratified sampler every prefix is well spread over the node's area: the
-// index, bit-reversed, runs along the distribution list, whose triangles are in Morton order. Based
-// on: Wand et al. 2001 ("Sample caching").
+// The points of a node of a mesh, or of a group that is instanced often: an endless sequence
+// (list_block.h), and a cache of the sequences' beginnings. With the stratified sampler every
+// prefix is well spread over the node's area: the index, bit-reversed, runs along the distribution
+// list, whose triangles are in Morton order, or along the children of a group's node. Based on:
+// Wand et al. 2001 ("Sample caching").
 #pragma once
 
 #include <core/parallel.h>
-#include <core/points.h>
-#include <sampling/list_point.h>
-#include <scenegraph/scene_editor.h>
-#include <scenegraph/visible_area.h>
+#include <sampling/list_block.h>
 
 #include <atomic>
 #include <map>
@@ -19,57 +16,8 @@
 
 namespace stipple {
 
-// Patch widths of list points are codes of metres from 2^this.
-inline constexpr int kFirstMetreExponent = -14;
-
-// 64 points, quantized to the node's box: 14 bytes each that drawing reads, then what is looked up.
-struct ListBlock {
-    alignas(64) uint16_t position[3][kBlockPoints];  // box.min + box.extent * q / 65535
-    int16_t normal[3][kBlockPoints];                 // geometric, times 32767 x the density that it
-                                                     // deserves over that of the list; 0 where an
-                                                     // alpha mask says there is no surface
-    uint8_t width[kBlockPoints];                     // patchWidthCode(), in metres
-    uint8_t single_sided[kBlockPoints];              // 1: not seen from behind
-    uint8_t alpha[kBlockPoints];  // of blended surfaces that are drawn in layers, below 255; 255
-                                  // elsewhere
-    // Of materials without textures: the shading normal (octahedral, 2 x 16 bits) and the albedo
-    // (sRGB-encoded, 8 bits a channel). Of others the triangle and the place on it (packPlace()):
-    // what is seen there depends on how far away it is.
-    uint32_t normal_or_triangle[kBlockPoints];
-    uint32_t albedo_or_place[kBlockPoints];
-    uint16_t material[kBlockPoints];
-    // In lists of groups: the instance of the group's InstanceStore or, where groups lie within,
-    // the low half of the object path from there on, so many levels deep; the point is prefiltered
-    // then.
-    uint32_t instance[kBlockPoints];
-    uint8_t levels[kBlockPoints];
-};
-
-uint32_t packOctahedral(const Vec3& unit);
-Vec3 unpackOctahedral(uint32_t packed);
-// Barycentrics, 16 bits each.
-uint32_t packPlace(Vec2 uv);
-Vec2 unpackPlace(uint32_t packed);
-
 // Lists grow up to here; points beyond are made anew each time.
 inline constexpr uint32_t kLongestList = 4096;
-
-// Names the sequences: everything their points depend on.
-struct ListIdentity {
-    uint64_t seed = 1;
-    Sampler sampler = Sampler::kStratified;
-    bool layers = false;  // blended surfaces have all their points, each with its alpha
-    bool operator==(const ListIdentity&) const = default;
-};
-
-// A sequence of points: on the whole surface below a node, or, for the root of a mesh, on what can
-// be seen of it from one of the directions of visible_area.h.
-struct ListName {
-    static constexpr int kWhole = -1;
-    ChildRef child;
-    uint32_t node = 0;
-    int direction = kWhole;
-};
 
 class PointLists {
 public:
@@ -80,14 +28,14 @@ public:
     bool hasLists(ChildRef child) const {
         return !slotsOf(child).empty() && !(child.isGroup() && is_stale_[child.index()]);
     }
-    // Call between frames: drops the lists of nodes that have changed, keeps the others.
+    // Call between frames: puts the lists of nodes that have changed aside, keeps the others.
     // O(what has changed + groups).
     void sceneChanged(const SceneChanges& changes);
     const ListIdentity& identity() const { return identity_; }
     // Call between frames: sets the identity (a new one empties the cache) and the budget. Where
     // it did not suffice, lists that were not used in the last frame are dropped; where it has
     // become smaller than what is there, all are. Lists that the last frame used and edits have
-    // dropped are made anew, by all threads.
+    // changed are brought up to date, by all threads.
     void startFrame(const ListIdentity& identity, size_t budget_bytes, ThreadPool& pool);
     // What can be seen of a mesh from a direction; measured when first asked for, then kept for the
     // frame at least, and beyond it within the budget. Thread-safe.
@@ -140,12 +88,14 @@ private:
     Seen& seen(uint32_t mesh, int direction);
     void drop(Slot& slot);
     void freeRetired();
-    void dropEdited(const ListName& name);
-    void dropGroup(uint32_t group);
-    void remakeDropped(ThreadPool& pool);
+    void putAside(const ListName& name, bool is_whole);
+    void putGroupAside(uint32_t group);
+    void dropOutdated();
+    void updateOutdated(ThreadPool& pool);
+    void updateNames();
     template <class Visit>
     void forEachSlot(const Visit& visit);
-    void makePoints(const ListName& name, uint32_t first, int count, ListBlock& out);
+    ListSource sourceOf(const ListName& name);
     void findStale();
     const SpacingTable& factorOf(ChildRef child);
     SpacingTable makeFactor(ChildRef child);
@@ -163,12 +113,14 @@ private:
     std::vector<std::atomic<const SpacingTable*>> factor_of_;  // by group
     std::mutex factor_mutex_;
     std::vector<bool> is_deep_;  // groups that hold groups: their lists' points are prefiltered
-    // Of groups, by edits since the last frame, which used them; with the blocks they had.
-    struct Dropped {
+    // Lists of groups that the last frame used, which edits have changed since.
+    struct Outdated {
         ListName name;
-        uint32_t block_count;
+        List list;
+        bool is_whole = false;  // no point of it is still right
     };
-    std::vector<Dropped> dropped_;
+    std::vector<Outdated> outdated_;
+    GroupEdits edits_;
     ListIdentity identity_;
     size_t budget_ = 0;
     std::atomic<size_t> bytes_{0}, visible_bytes_{0};

@@ -21,9 +21,10 @@ KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, 
                         uint32_t node_index, bool is_visible, const RunDensity& density) {
     const View& view = context.view;
     const Box3& bounds = nodeBounds(context.scene, child, node_index);
+    const Box3 box = listBox(context.scene, child, node_index);
     KernelParams params;
-    params.box_from_eye = Vec3(DVec3(bounds.min) - frame.eye_object);
-    params.step = bounds.extent() / 65535.0f;
+    params.box_from_eye = Vec3(DVec3(box.min) - frame.eye_object);
+    params.step = box.extent() / 65535.0f;
     params.camera_from_object = Mat3(frame.camera_from_object.linear);
     params.orthographic = view.orthographic;
     params.facing = Vec3(frame.facing);

@@ -406,6 +406,7 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             below = ChildRef::group(copy);
             scene_.groups[id.group].instances.setChild(slot, below);
             markEdited(id);
+            noteMember(id);
             addUse(id, below);
             refreshUpwards(id.group, open_[id.group]->node_of[slot]);
         }

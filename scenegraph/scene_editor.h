@@ -24,8 +24,9 @@ struct SceneChanges {
     struct Node {
         uint32_t group = 0, node = 0;
     };
-    std::vector<Node> nodes;  // of groups: the instances below are others, or elsewhere
-    bool all_nodes = false;   // too many to tell
+    std::vector<Node> nodes;            // of groups: the instances below are others, or elsewhere
+    std::vector<InstanceId> instances;  // came, went, moved, or show something else
+    bool all_nodes = false;             // too many nodes or instances to tell
     // Groups that have changed, and all that hold them.
     std::vector<uint32_t> groups;
     // Of these, those in which any node may show something else.
@@ -154,6 +155,8 @@ private:
     int depthAbove(uint32_t group) const;
     void countInstances(uint32_t group, double instances, double triangles);
     void note(uint32_t group, uint32_t node);
+    void noteMember(InstanceId id);
+    void forgetIfTooMany();
     void noteBox(uint32_t group, const DBox3& box);
     void noteBox(uint32_t group, const DBox3& box, int& steps);
     std::vector<uint32_t> withHolders(std::vector<uint32_t> groups) const;

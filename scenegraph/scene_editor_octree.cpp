@@ -25,6 +25,7 @@ uint32_t capacityFor(uint32_t count) { return std::bit_ceil(std::max(count, 4u))
 void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_child) {
     addUse(id, child);
     markEdited(id);
+    noteMember(id);
     if (child.isGroup()) deepen(id.group, scene_.groups[child.index()].depth + 1);
     DVec3 center, half;
     if (instanceBox(childSums(scene_, child), group_from_child, center, half))
@@ -54,6 +55,7 @@ void SceneEditor::take(InstanceId id) {
         noteBox(id.group, {center - half, center + half});
     removeUse(id, child);
     markEdited(id);
+    noteMember(id);
     const bool is_group = child.isGroup();
     countInstances(id.group, is_group ? -scene_.groups[child.index()].instances_total : -1.0,
                    is_group ? -scene_.groups[child.index()].triangles_total
@@ -256,8 +258,10 @@ void SceneEditor::split(uint32_t group_index, uint32_t node_index) {
         GroupNode child;
         child.first = takePlaces(group_index, capacity);
         child.free_count = uint16_t(capacity - count);
-        for (const uint32_t i : parts[p])
+        for (const uint32_t i : parts[p]) {
+            noteMember({group_index, group.listed_index[first + i]});
             moveResident(group_index, first + i, child.first + child.resident_count++, c);
+        }
         open.parent[c] = node_index;
         group.nodes[c] = child;
         if (count > kMostResidents) split(group_index, c);
@@ -290,7 +294,10 @@ void SceneEditor::collapse(uint32_t group_index, uint32_t node_index) {
     const uint32_t count = uint32_t(slots.size()),
                    capacity = std::min(capacityFor(count), count + 0x8000),
                    to = takePlaces(group_index, capacity);
-    for (uint32_t i = 0; i < count; ++i) moveResident(group_index, slots[i], to + i, node_index);
+    for (uint32_t i = 0; i < count; ++i) {
+        noteMember({group_index, group.listed_index[slots[i]]});
+        moveResident(group_index, slots[i], to + i, node_index);
+    }
     for (const uint32_t n : nodes) {
         GroupNode& node = group.nodes[n];
         freePlaces(group_index, node.first, placesOf(node));
@@ -331,12 +338,21 @@ uint32_t SceneEditor::rebuildIfTooDeep(uint32_t group_index, uint32_t leaf) {
 
 void SceneEditor::note(uint32_t group, uint32_t node) {
     changes_.any = true;
-    if (changes_.all_nodes) return;
-    changes_.nodes.push_back({group, node});
-    if (changes_.nodes.size() > kMostChanges) {
-        changes_.all_nodes = true;
-        changes_.nodes.clear();
-    }
+    if (!changes_.all_nodes) changes_.nodes.push_back({group, node});
+    forgetIfTooMany();
+}
+
+void SceneEditor::noteMember(InstanceId id) {
+    changes_.any = true;
+    if (!changes_.all_nodes) changes_.instances.push_back(id);
+    forgetIfTooMany();
+}
+
+void SceneEditor::forgetIfTooMany() {
+    if (changes_.nodes.size() + changes_.instances.size() <= kMostChanges) return;
+    changes_.all_nodes = true;
+    changes_.nodes.clear();
+    changes_.instances.clear();
 }
 
 // Of a box in a group: everywhere that the group is instanced.

@@ -261,22 +261,59 @@ TEST(SceneEditor, pointsFallOnInstancesByTheirAreas) {
     std::vector<InstanceId> alive = idsOf(scene, 0);
     editAtRandom(editor, alive, 0, 30000, 500.0, rng);
     const Group& group = scene.groups[0];
-    std::map<uint32_t, double> hits;
     constexpr int kDraws = 400000;
-    for (int i = 0; i < kDraws; ++i)
-        ++hits[instanceAt(scene, group, 0, rng.uniform(0.0, 1.0)).instance];
-    double chi_square = 0.0, categories = 0.0;
-    for (uint32_t i = 0; i < group.instances.size(); ++i) {
-        if (group.instances.child(i).isNone()) continue;
-        const double expected = kDraws * childArea(scene, group.instances.child(i)) *
-                                group.instances.areaScale(i) / group.area;
-        if (expected < 10.0) continue;
-        const double d = hits[i] - expected;
-        chi_square += d * d / expected;
-        ++categories;
+    std::map<uint32_t, double> along, chosen;
+    for (int i = 0; i < kDraws; ++i) {
+        ++along[instanceAt(scene, group, 0, rng.uniform(0.0, 1.0)).instance];
+        ++chosen[chooseInstance(scene, group, 0, rng.uniform(0.0, 1.0), rng.next()).instance];
     }
-    ASSERT_GT(categories, 50.0);
-    EXPECT_LT(chi_square, categories + 4.0 * std::sqrt(2.0 * categories));
+    for (auto& hits : {along, chosen}) {
+        double chi_square = 0.0, categories = 0.0;
+        for (uint32_t i = 0; i < group.instances.size(); ++i) {
+            if (group.instances.child(i).isNone()) continue;
+            const double expected = kDraws * childArea(scene, group.instances.child(i)) *
+                                    group.instances.areaScale(i) / group.area;
+            if (expected < 10.0) continue;
+            const double d = (hits.contains(i) ? hits.at(i) : 0.0) - expected;
+            chi_square += d * d / expected;
+            ++categories;
+        }
+        ASSERT_GT(categories, 50.0);
+        EXPECT_LT(chi_square, categories + 4.0 * std::sqrt(2.0 * categories));
+    }
+}
+
+bool areSame(const ListBlock& a, const ListBlock& b) {
+    const auto same = [](const auto& x, const auto& y) {
+        return std::memcmp(&x, &y, sizeof x) == 0;
+    };
+    return same(a.position, b.position) && same(a.normal, b.normal) && same(a.width, b.width) &&
+           same(a.single_sided, b.single_sided) && same(a.alpha, b.alpha) &&
+           same(a.normal_or_triangle, b.normal_or_triangle) &&
+           same(a.albedo_or_place, b.albedo_or_place) && same(a.material, b.material) &&
+           same(a.instance, b.instance) && same(a.levels, b.levels) && same(a.branch, b.branch) &&
+           same(a.box, b.box);
+}
+
+// Uses all lists of a group, which must be what they would be if they were made now.
+size_t expectLists(const Scene& scene, PointLists& lists, uint32_t group_index) {
+    PointLists fresh(scene);
+    ThreadPool pool(1);
+    fresh.startFrame(lists.identity(), 0, pool);
+    const ChildRef group = ChildRef::group(group_index);
+    size_t n = 0;
+    for (uint32_t node = 0; node < scene.groups[group_index].nodes.size(); ++node) {
+        if (!lists.hasLists(group) || !(scene.groups[group_index].nodes[node].area > 0.0)) continue;
+        for (uint32_t first = 0; first < 512; first += 64) {
+            ListBlock scratch_a, scratch_b;
+            int lane = 0;
+            const ListBlock& a = lists.points({group, node}, first, 64, 512, scratch_a, lane);
+            const ListBlock& b = fresh.points({group, node}, first, 64, 512, scratch_b, lane);
+            EXPECT_TRUE(areSame(a, b)) << "node " << node << ", points from " << first;
+        }
+        ++n;
+    }
+    return n;
 }
 
 // Lists of what did not change are kept; all hold what they would if they were made now.
@@ -291,21 +328,7 @@ TEST(SceneEditor, cachedPointsFollow) {
     std::vector<InstanceId> alive = idsOf(scene, 1);
     for (int round = 0; round < 20; ++round) {
         lists.startFrame(identity, size_t(64) << 20, pool);
-        PointLists fresh(scene);
-        fresh.startFrame(identity, 0, pool);
-        size_t compared = 0;
-        for (uint32_t node = 0; node < scene.groups[1].nodes.size(); ++node) {
-            if (!(scene.groups[1].nodes[node].area > 0.0)) continue;
-            const ListName name{ChildRef::group(1), node};
-            ListBlock scratch_a, scratch_b;
-            int lane_a = 0, lane_b = 0;
-            const ListBlock& a = lists.points(name, 64, 64, 128, scratch_a, lane_a);
-            const ListBlock& b = fresh.points(name, 64, 64, 128, scratch_b, lane_b);
-            ASSERT_EQ(std::memcmp(a.position, b.position, sizeof a.position), 0) << node;
-            ASSERT_EQ(std::memcmp(a.instance, b.instance, sizeof a.instance), 0) << node;
-            ++compared;
-        }
-        EXPECT_GT(compared, 0u);
+        ASSERT_GT(expectLists(scene, lists, 1), 0u);
         const size_t before = lists.bytes();
         editAtRandom(editor, alive, 1, round % 3 == 0 ? 1 : 50, 20.0, rng);
         lists.sceneChanged(editor.takeChanges());
@@ -314,6 +337,72 @@ TEST(SceneEditor, cachedPointsFollow) {
             EXPECT_GT(lists.bytes(), 0u) << "the others are kept";
         }
     }
+}
+
+// Of groups of groups, too, where the groups within are edited.
+TEST(SceneEditor, cachedPointsOfNestedGroupsFollow) {
+    Scene scene = makeScene(20, 3);
+    Group world;
+    world.name = "world";
+    for (int i = 0; i < 10; ++i)
+        world.instances.add(ChildRef::group(0), {DMat3(1.0), DVec3(2000.0 * i, 0, 0)});
+    scene.groups.push_back(world);
+    scene.root = 2;
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    SceneEditor editor(scene);
+    PointLists lists(scene);
+    ASSERT_TRUE(lists.hasLists(ChildRef::group(0)));
+    Rng rng{17};
+    std::vector<InstanceId> inner = idsOf(scene, 1), outer;
+    for (const InstanceId id : idsOf(scene, 0))
+        if (!editor.child(id).isGroup()) outer.push_back(id);
+    for (int round = 0; round < 20; ++round) {
+        lists.startFrame({}, size_t(64) << 20, pool);
+        ASSERT_GT(expectLists(scene, lists, 0), 0u);
+        editAtRandom(editor, inner, 1, 1 + round % 3, 20.0, rng);
+        if (round % 2 == 0) editAtRandom(editor, outer, 0, 1, 500.0, rng);
+        lists.sceneChanged(editor.takeChanges());
+    }
+}
+
+// An edit changes about as many points as what it changes has.
+TEST(SceneEditor, cachedPointsChangeOnlyWhereTheSceneDoes) {
+    Scene scene = makeScene(50, 20);
+    SceneEditor editor(scene);
+    const std::vector<InstanceId> alive = idsOf(scene, 1);
+    const ListIdentity identity;
+    const ListName name{ChildRef::group(1), 0};
+    constexpr int kBlocks = 64;
+    const auto listNow = [&] {
+        std::vector<ListBlock> blocks(kBlocks);
+        for (int b = 0; b < kBlocks; ++b)
+            makeListPoints({scene, identity, name}, uint32_t(b * kBlockPoints), kBlockPoints,
+                           blocks[size_t(b)]);
+        return blocks;
+    };
+    double changed = 0.0, expected = 0.0;
+    for (const InstanceId id : alive) {
+        const std::vector<ListBlock> before = listNow();
+        const ChildRef child = editor.child(id);
+        const Affine place = editor.groupFromChild(id);
+        const double share =
+            childArea(scene, child) * maxAreaScale(place.linear) / scene.groups[1].nodes[0].area;
+        editor.remove(id);
+        const std::vector<ListBlock> after = listNow();
+        editor.restore(id, child, place);
+        if (!(before[0].box.min == after[0].box.min && before[0].box.max == after[0].box.max))
+            continue;
+        expected += share * kBlocks * kBlockPoints;
+        for (size_t b = 0; b < kBlocks; ++b) {
+            for (int lane = 0; lane < kBlockPoints; ++lane)
+                changed += before[b].position[0][lane] != after[b].position[0][lane];
+        }
+        EXPECT_TRUE(areSame(listNow()[0], before[0])) << "undone";
+    }
+    ASSERT_GT(expected, 200.0);
+    EXPECT_GT(changed, 0.9 * expected);
+    EXPECT_LT(changed, 5.0 * expected);
 }
 
 // A group that is built anew may have far fewer nodes than its lists know of.
