@@ -47,8 +47,9 @@ private:
     void visitGroup(const Pending& p, std::vector<Pending>& opened) {
         const Group& group = scene_.groups[p.child.index()];
         const GroupNode& node = group.nodes[p.node];
-        const BoxProjection box = projectBox(view_, p.camera_from_child.linear,
-                                             p.camera_from_child.translation, node.bounds);
+        const BoxProjection box =
+            projectBox(view_, p.camera_from_child.linear, p.camera_from_child.translation,
+                       nodeBounds(group, p.node));
         if (!box.is_visible || !(node.area > 0.0)) return;
         const double bound = box.bound * maxAreaScale(p.camera_from_child.linear);
         const bool has_large = rasterize_all_ || mayBeLarge(node.max_triangle_area, bound);

@@ -20,7 +20,7 @@ uint32_t listLength(uint64_t end) {
 KernelParams makeParams(const TileContext& context, const InstanceFrame& frame, ChildRef child,
                         uint32_t node_index, bool is_visible, const RunDensity& density) {
     const View& view = context.view;
-    const Box3& bounds = nodeBounds(context.scene, child, node_index);
+    const Box3 bounds = nodeBounds(context.scene, child, node_index);
     const Box3 box = listBox(context.scene, child, node_index);
     KernelParams params;
     params.box_from_eye = Vec3(DVec3(box.min) - frame.eye_object);

@@ -101,12 +101,12 @@ void TileCut::drawGroupNode(ChildRef ref, uint32_t node_index, const Affine& cam
     for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
         const ChildRef child = group.instances.child(i);
         collect(camera_from_group * group.instances.groupFromChild(i),
-                child.isGroup() ? scene.groups[child.index()].nodes[0].bounds
+                child.isGroup() ? nodeBounds(scene.groups[child.index()], 0)
                                 : scene.meshes[child.index()].bounds,
                 i, true);
     }
     for (uint32_t c = node.first_child; c < node.first_child + node.child_count; ++c)
-        collect(camera_from_group, group.nodes[c].bounds, c, false);
+        collect(camera_from_group, nodeBounds(group, c), c, false);
     sortCollected(begin);
     const size_t end = opened_.size();
     for (size_t k = begin; k < end; ++k) {

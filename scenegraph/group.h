@@ -53,8 +53,11 @@ struct Group {
     double area = 0.0;
     float max_triangle_area = 0.0f;
     // What the sums of the groups that instance it were made with. Edits of a group that is
-    // instanced very often leave it behind by less than a factor of two in area (scene_editor.h).
+    // instanced very often leave it behind by less than a factor of two in area, and its bounds by
+    // what is in the slack of these groups (scene_editor.h).
     ChildSums as_child;
+    // m of group space: how far what is below may stand out of the nodes' bounds, at most.
+    float slack = 0.0f;
     double instances_total = 0.0;  // mesh instances below, expanded
     double triangles_total = 0.0;  // triangles below, expanded
     int depth = 1;                 // levels of instancing below (1: meshes only)

@@ -21,7 +21,7 @@ struct Picker {
     bool find(const Group& group, uint32_t node_index, const DVec3& p, double tolerance,
               uint64_t hash) {
         const GroupNode& node = group.nodes[node_index];
-        if (!holds(node.bounds, p, tolerance)) return false;
+        if (!holds(nodeBounds(group, node_index), p, tolerance)) return false;
         for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
             const ChildRef child = group.instances.child(i);
             const Affine group_from_child = group.instances.groupFromChild(i);

@@ -40,8 +40,13 @@ inline double childArea(const Scene& scene, ChildRef child) {
     return child.isGroup() ? scene.groups[child.index()].as_child.area
                            : scene.meshes[child.index()].area;
 }
-inline const Box3& nodeBounds(const Scene& scene, ChildRef child, uint32_t node) {
-    return child.isGroup() ? scene.groups[child.index()].nodes[node].bounds
+// Of everything below, in the group's or mesh's space.
+inline Box3 nodeBounds(const Group& group, uint32_t node) {
+    const Box3& bounds = group.nodes[node].bounds;
+    return {bounds.min - group.slack, bounds.max + group.slack};
+}
+inline Box3 nodeBounds(const Scene& scene, ChildRef child, uint32_t node) {
+    return child.isGroup() ? nodeBounds(scene.groups[child.index()], node)
                            : scene.meshes[child.index()].nodes[node].bounds;
 }
 

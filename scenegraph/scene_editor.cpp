@@ -23,6 +23,12 @@ std::string freeName(const Scene& scene, const std::string& name) {
     }
 }
 
+// The most that an instance enlarges its child.
+double lengthScale(const InstanceStore& instances, size_t i) {
+    return instances.isSimilarity(i) ? std::sqrt(instances.areaScale(i))
+                                     : maxLengthScale(instances.groupFromChild(i).linear);
+}
+
 [[noreturn]] void refuse(const std::string& what) {
     throw Error(ErrorCode::kInvalidArgument, "", what);
 }
@@ -33,20 +39,24 @@ SceneEditor::SceneEditor(Scene& scene) : scene_(scene) {
     open_.resize(scene.groups.size());
     uses_.resize(scene.groups.size());
     holders_.resize(scene.groups.size());
+    outgrown_.resize(scene.groups.size(), 0.0);
     for (uint32_t g = 0; g < scene.groups.size(); ++g) {
         const Group& group = scene.groups[g];
         for (uint32_t i = 0; i < group.instances.size(); ++i) {
             const ChildRef child = group.instances.child(i);
-            if (!child.isNone()) addUse({g, group.listed_index[i]}, child);
+            if (!child.isNone() && child.isGroup())
+                addUse({g, group.listed_index[i]}, child, lengthScale(group.instances, i));
         }
     }
 }
 
-void SceneEditor::addUse(InstanceId place, ChildRef child) {
+void SceneEditor::addUse(InstanceId place, ChildRef child, double length_scale) {
     if (!child.isGroup()) return;
     Uses& uses = uses_[child.index()];
     if (++uses.count <= kFewUses) uses.places.push_back(place);
-    ++holders_[child.index()][place.group];
+    Held& held = holders_[child.index()][place.group];
+    ++held.count;
+    held.length_scale = std::max(held.length_scale, length_scale);
 }
 
 void SceneEditor::removeUse(InstanceId place, ChildRef child) {
@@ -54,9 +64,9 @@ void SceneEditor::removeUse(InstanceId place, ChildRef child) {
     Uses& uses = uses_[child.index()];
     --uses.count;
     std::erase(uses.places, place);
-    std::map<uint32_t, size_t>& holders = holders_[child.index()];
+    std::map<uint32_t, Held>& holders = holders_[child.index()];
     const auto found = holders.find(place.group);
-    if (--found->second == 0) holders.erase(found);
+    if (--found->second.count == 0) holders.erase(found);
 }
 
 SceneEditor::OpenGroup& SceneEditor::opened(uint32_t index) {
@@ -129,7 +139,7 @@ std::vector<uint32_t> SceneEditor::withHolders(std::vector<uint32_t> groups) con
         if (seen[g]) continue;
         seen[g] = true;
         result.push_back(g);
-        for (const auto& [holder, count] : holders_[g]) groups.push_back(holder);
+        for (const auto& [holder, held] : holders_[g]) groups.push_back(holder);
     }
     return result;
 }
@@ -174,7 +184,7 @@ int SceneEditor::depthAbove(uint32_t group) const {
     int most = 0;
     for (const uint32_t g : around) {
         most = std::max(most, above[g]);
-        for (const auto& [holder, count] : holders_[g])
+        for (const auto& [holder, held] : holders_[g])
             above[holder] = std::max(above[holder], above[g] + 1);
     }
     return most;
@@ -188,7 +198,7 @@ void SceneEditor::deepen(uint32_t group, int depth) {
         open.pop_back();
         if (scene_.groups[g].depth >= least) continue;
         scene_.groups[g].depth = least;
-        for (const auto& [holder, count] : holders_[g]) open.emplace_back(holder, least + 1);
+        for (const auto& [holder, held] : holders_[g]) open.emplace_back(holder, least + 1);
     }
 }
 
@@ -290,7 +300,7 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     });
     for (const NewInstance& i : instances) {
         const InstanceId id{group_index, group.next_index};
-        addUse(id, i.child);
+        addUse(id, i.child, maxLengthScale(i.group_from_child.linear));
         group.listed_index.push_back(group.next_index++);
         markEdited(id);
     }
@@ -298,6 +308,7 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     const int depth_before = group.depth;
     buildGroup(scene_, group, scene_.path + ": /groups/" + group.name, pool);
     group.as_child = as_child;
+    setBounds(group);
     deepen(group_index, std::exchange(group.depth, depth_before));
     open_[group_index].reset();
     opened(group_index);
@@ -349,12 +360,14 @@ ChildRef SceneEditor::addAsset(const std::string& name, Scene asset, ChildRef ch
     open_.resize(n_groups);
     uses_.resize(n_groups);
     holders_.resize(n_groups);
+    outgrown_.resize(n_groups, 0.0);
     for (Group& group : asset.groups) {
         const uint32_t index = uint32_t(scene_.groups.size());
         for (uint32_t i = 0; i < group.instances.size(); ++i) {
             const ChildRef inner = renamed(group.instances.child(i));
             group.instances.setChild(i, inner);
-            if (!inner.isNone()) addUse({index, group.listed_index[i]}, inner);
+            if (!inner.isNone() && inner.isGroup())
+                addUse({index, group.listed_index[i]}, inner, lengthScale(group.instances, i));
         }
         scene_.groups.push_back(std::move(group));
     }
@@ -392,6 +405,7 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             open_.push_back(source ? std::make_unique<OpenGroup>(*source) : nullptr);
             uses_.emplace_back();
             holders_.emplace_back();
+            outgrown_.push_back(0.0);
             Group& group = scene_.groups[copy];
             group.as_child = {group.bounds, group.area, group.max_triangle_area};
             if (group.copy_of.empty()) group.copy_of = group.name;
@@ -399,7 +413,8 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             scene_.names[group.name] = ChildRef::group(copy);
             for (uint32_t k = 0; k < group.instances.size(); ++k) {
                 const ChildRef inner = group.instances.child(k);
-                if (!inner.isNone()) addUse({copy, group.listed_index[k]}, inner);
+                if (!inner.isNone() && inner.isGroup())
+                    addUse({copy, group.listed_index[k]}, inner, lengthScale(group.instances, k));
             }
             const uint32_t slot = slotOf(id);
             removeUse(id, below);
@@ -407,7 +422,7 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             scene_.groups[id.group].instances.setChild(slot, below);
             markEdited(id);
             noteMember(id);
-            addUse(id, below);
+            addUse(id, below, lengthScale(scene_.groups[id.group].instances, slot));
             refreshUpwards(id.group, open_[id.group]->node_of[slot]);
         }
         id.group = below.index();
@@ -432,6 +447,19 @@ void SceneEditor::refresh(Dirty dirty) {
     }
 }
 
+namespace {
+
+// The farthest that a point of one box lies outside of another.
+double standsOutBy(const DBox3& box, const DBox3& of) {
+    if (box.isEmpty()) return 0.0;
+    if (of.isEmpty()) return kInfinity;
+    return glm::length(glm::max(glm::max(of.min - box.min, box.max - of.max), DVec3(0.0)));
+}
+
+constexpr double kMostOutgrown = 0.25;  // of the length of its diagonal
+
+}  // namespace
+
 // Lets the groups that instance it know.
 void SceneEditor::groupChanged(uint32_t index, Dirty& dirty) {
     Group& group = scene_.groups[index];
@@ -447,18 +475,44 @@ void SceneEditor::groupChanged(uint32_t index, Dirty& dirty) {
         }
     } else {
         const ChildSums& was = group.as_child;
-        const bool fits = now.bounds.isEmpty() ||
-                          (!was.bounds.isEmpty() &&
-                           glm::all(glm::greaterThanEqual(now.bounds.min, was.bounds.min)) &&
-                           glm::all(glm::lessThanEqual(now.bounds.max, was.bounds.max)));
+        const double outgrown = standsOutBy(now.bounds, was.bounds);
+        const bool fits =
+            outgrown == 0.0 || outgrown <= kMostOutgrown * glm::length(was.bounds.extent());
         if (fits && now.max_triangle_area <= was.max_triangle_area && now.area <= 2.0 * was.area &&
             now.area >= 0.5 * was.area) {
             if (untold_.empty() || untold_.back() != index) untold_.push_back(index);
+            setOutgrown(index, outgrown, dirty);
             return;
         }
         group.as_child = now;
-        for (const auto& [holder, count] : holders_[index]) addDirty(holder, kGone, dirty);
+        for (const auto& [holder, held] : holders_[index]) addDirty(holder, kGone, dirty);
     }
+    setOutgrown(index, 0.0, dirty);
+}
+
+// Gives the groups that hold it the slack that they need for all that they hold.
+void SceneEditor::setOutgrown(uint32_t index, double length, Dirty& dirty) {
+    if (std::exchange(outgrown_[index], length) == length) return;
+    for (const auto& [holder, held] : holders_[index]) {
+        double slack = 0.0;
+        for (uint32_t g = 0; g < holders_.size(); ++g) {
+            const auto found = outgrown_[g] > 0.0 ? holders_[g].find(holder) : holders_[g].end();
+            if (found != holders_[g].end())
+                slack = std::max(slack, outgrown_[g] * found->second.length_scale);
+        }
+        constexpr double kRounding = 1.01;
+        Group& group = scene_.groups[holder];
+        if (float(slack * kRounding) == group.slack) continue;
+        group.slack = float(slack * kRounding);
+        rebuilt_.push_back(holder);
+        dirty[{group.depth, holder}];
+    }
+}
+
+void SceneEditor::setBounds(Group& group) const {
+    const Box3 bounds = nodeBounds(group, 0);
+    group.bounds =
+        group.nodes[0].area > 0.0 ? DBox3{DVec3(bounds.min), DVec3(bounds.max)} : DBox3();
 }
 
 // Numbers for people: in all groups above, too, from the innermost outwards.
@@ -471,10 +525,10 @@ void SceneEditor::countInstances(uint32_t index, double instances, double triang
         const auto [n_instances, n_triangles] = of_group.mapped();
         scene_.groups[g].instances_total += n_instances;
         scene_.groups[g].triangles_total += n_triangles;
-        for (const auto& [holder, count] : holders_[g]) {
+        for (const auto& [holder, held] : holders_[g]) {
             auto& sum = more[{scene_.groups[holder].depth, holder}];
-            sum.first += n_instances * double(count);
-            sum.second += n_triangles * double(count);
+            sum.first += n_instances * double(held.count);
+            sum.second += n_triangles * double(held.count);
         }
     }
 }
@@ -488,7 +542,7 @@ SceneChanges SceneEditor::takeChanges() {
     changed.insert(changed.end(), rebuilt.begin(), rebuilt.end());
     for (const SceneChanges::Node& node : changes.nodes) changed.push_back(node.group);
     const auto addHolders = [&](uint32_t group, std::vector<uint32_t>& groups) {
-        for (const auto& [holder, count] : holders_[group]) groups.push_back(holder);
+        for (const auto& [holder, held] : holders_[group]) groups.push_back(holder);
     };
     for (const uint32_t group : untold) addHolders(group, around_untold);
     for (uint32_t g = 0; g < scene_.groups.size(); ++g) {

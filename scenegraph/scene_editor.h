@@ -54,8 +54,9 @@ public:
 
     // O(log n), inserts and moves on average: a part of the octree that has become too deep is made
     // anew. O(n) for the first edit of a group. A group's bounds grow in the groups that
-    // instance it: O(log n) for each of the places, up to kFewUses of them; beyond, only when they
-    // have grown, or its area has doubled or halved, and then O(n) of the groups that instance it.
+    // instance it: O(log n) for each of the places, up to kFewUses of them; beyond, O(groups) for
+    // their slack, until that is a quarter of the group's size, its area has doubled or halved, or
+    // its largest triangle has grown: then O(n) of the groups that instance it.
     InstanceId insert(uint32_t group, ChildRef child, const Affine& group_from_child);
     void remove(InstanceId id);
     void move(InstanceId id, const Affine& group_from_child);
@@ -115,6 +116,11 @@ private:
         std::vector<std::vector<uint32_t>> free_places;  // by the binary logarithm of their number
         std::vector<std::vector<uint32_t>> free_nodes;   // blocks of siblings, by their number
     };
+    // In a group: how often another is instanced, and the most that it is enlarged there.
+    struct Held {
+        size_t count = 0;
+        double length_scale = 0.0;
+    };
     // How often a group is instanced, and where, if that is not often.
     struct Uses {
         size_t count = 0;
@@ -127,7 +133,7 @@ private:
     void checkInserts(uint32_t group, const std::vector<NewInstance>& instances,
                       ThreadPool& pool) const;
     bool reaches(ChildRef from, uint32_t group) const;
-    void addUse(InstanceId place, ChildRef child);
+    void addUse(InstanceId place, ChildRef child, double length_scale);
     void removeUse(InstanceId place, ChildRef child);
 
     void place(InstanceId id, ChildRef child, const Affine& group_from_child);
@@ -144,12 +150,14 @@ private:
     void collapse(uint32_t group, uint32_t node);
     uint32_t rebuildIfTooDeep(uint32_t group, uint32_t leaf);
     // Nodes whose sums are not up to date, by depth and group, so that what is within comes before
-    // what holds it, and each group is summed up once; kGone: all of the group's.
+    // what holds it, and each group is summed up once; kGone: all of the group's; none: its bounds.
     using Dirty = std::map<std::pair<int, uint32_t>, std::vector<uint32_t>>;
     void refreshUpwards(uint32_t group, uint32_t node);
     void refresh(Dirty dirty);
     void refreshNodes(uint32_t group, const std::vector<uint32_t>& nodes);
     void groupChanged(uint32_t group, Dirty& dirty);
+    void setOutgrown(uint32_t group, double length, Dirty& dirty);
+    void setBounds(Group& group) const;
     void addDirty(uint32_t group, uint32_t node, Dirty& dirty) const;
     void deepen(uint32_t group, int depth);
     int depthAbove(uint32_t group) const;
@@ -163,13 +171,14 @@ private:
     void markEdited(InstanceId id);
 
     Scene& scene_;
-    std::vector<std::unique_ptr<OpenGroup>> open_;  // by group
-    std::vector<Uses> uses_;                        // by group
-    // By group: the groups that hold it, and how often.
-    std::vector<std::map<uint32_t, size_t>> holders_;
+    std::vector<std::unique_ptr<OpenGroup>> open_;   // by group
+    std::vector<Uses> uses_;                         // by group
+    std::vector<std::map<uint32_t, Held>> holders_;  // by group: the groups that hold it
+    // By group: how far it stands out of what the groups that hold it know of its bounds.
+    std::vector<double> outgrown_;
     SceneChanges changes_;
     std::vector<uint32_t> untold_;   // have changed, and the nodes that show them are not noted
-    std::vector<uint32_t> rebuilt_;  // have other nodes
+    std::vector<uint32_t> rebuilt_;  // have other nodes, or another slack
     std::map<std::string, std::string> added_assets_;
 };
 

@@ -23,7 +23,7 @@ uint32_t capacityFor(uint32_t count) { return std::bit_ceil(std::max(count, 4u))
 }  // namespace
 
 void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_child) {
-    addUse(id, child);
+    addUse(id, child, maxLengthScale(group_from_child.linear));
     markEdited(id);
     noteMember(id);
     if (child.isGroup()) deepen(id.group, scene_.groups[child.index()].depth + 1);
@@ -417,8 +417,7 @@ void SceneEditor::refreshNodes(uint32_t group_index, const std::vector<uint32_t>
     const GroupNode& root = group.nodes[0];
     group.area = root.area;
     group.max_triangle_area = root.max_triangle_area;
-    group.bounds =
-        root.area > 0.0 ? DBox3{DVec3(root.bounds.min), DVec3(root.bounds.max)} : DBox3();
+    setBounds(group);
 }
 
 }  // namespace stipple

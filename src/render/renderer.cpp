@@ -27,7 +27,7 @@ std::vector<RasterMesh> rasterMeshes(const Scene& scene) {
 std::vector<CutBox> cutBoxes(const Scene& scene, const FramePlan& plan) {
     std::vector<CutBox> boxes;
     for (const PlannedNode& node : plan.nodes) {
-        const Box3& bounds = nodeBounds(scene, node.child, node.node);
+        const Box3 bounds = nodeBounds(scene, node.child, node.node);
         CutBox box;
         for (int i = 0; i < 8; ++i) {
             DVec3 p;

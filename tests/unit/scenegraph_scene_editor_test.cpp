@@ -231,6 +231,64 @@ TEST(SceneEditor, aGroupChangesEverywhereOrInOnePlace) {
     }
 }
 
+// What is below every node, wherever the groups now are, lies within its bounds and slack.
+void expectEnclosed(const Scene& scene, const Group& group) {
+    for (uint32_t n = 0; n < group.nodes.size(); ++n) {
+        const Box3 bounds = nodeBounds(group, n);
+        const GroupNode& node = group.nodes[n];
+        for (uint32_t i = node.first; i < node.first + node.resident_count; ++i) {
+            const ChildRef child = group.instances.child(i);
+            ChildSums sums = childSums(scene, child);
+            if (child.isGroup()) sums.bounds = scene.groups[child.index()].bounds;
+            DVec3 center, half;
+            instanceBox(sums, group.instances.groupFromChild(i), center, half);
+            EXPECT_TRUE(glm::all(glm::lessThanEqual(DVec3(bounds.min) - 1e-6, center - half)));
+            EXPECT_TRUE(glm::all(glm::greaterThanEqual(DVec3(bounds.max) + 1e-6, center + half)));
+        }
+    }
+}
+
+// Where a group is instanced often, what stands out of its bounds costs as little as what does not.
+TEST(SceneEditor, groupsInstancedOftenMayOutgrowTheirBounds) {
+    Scene scene = makeScene(50, 40);
+    Group world;
+    world.name = "world";
+    for (int i = 0; i < 30; ++i)
+        world.instances.add(ChildRef::group(0), {DMat3(0.5), DVec3(2000.0 * i, 0, 0)});
+    scene.groups.push_back(world);
+    scene.root = 2;
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    const Scene before = scene;
+    SceneEditor editor(scene);
+    editor.open(1);
+    const Affine above{DMat3(1.0), DVec3(0, before.groups[1].bounds.max.y + 3.0, 0)};
+    const InstanceId id = editor.insert(1, ChildRef::mesh(0), above);
+    SceneChanges changes = editor.takeChanges();
+    for (const SceneChanges::Node& node : changes.nodes) EXPECT_EQ(node.group, 1u);
+    EXPECT_EQ(changes.whole_groups.size(), 2u) << "what holds it may show something else";
+    for (const Group& group : scene.groups) expectEnclosed(scene, group);
+    EXPECT_NEAR(scene.groups[0].slack, 3.5, 0.1);
+    EXPECT_GT(scene.groups[2].bounds.max.y, before.groups[2].bounds.max.y);
+
+    editor.remove(id);
+    for (size_t g = 0; g < 3; ++g) {
+        EXPECT_EQ(scene.groups[g].slack, 0.0f);
+        EXPECT_NEAR(scene.groups[g].bounds.max.y, before.groups[g].bounds.max.y, 1e-4);
+    }
+
+    // So far out that slack would serve nobody.
+    editor.takeChanges();
+    editor.insert(1, ChildRef::mesh(0), {DMat3(1.0), DVec3(0, 1000, 0)});
+    changes = editor.takeChanges();
+    EXPECT_GT(changes.nodes.size(), before.groups[0].nodes.size());
+    for (const Group& group : scene.groups) {
+        EXPECT_EQ(group.slack, 0.0f);
+        expectEnclosed(scene, group);
+        checkOctree(scene, group);
+    }
+}
+
 TEST(SceneEditor, manyAtOnceAreAsOneByOne) {
     for (const size_t n : {size_t(20), size_t(5000)}) {
         Scene scene = makeScene(1000, 2);
