@@ -78,7 +78,8 @@ private:
             addBatch(p, box, std::min(mesh.surfels->area * box.bound * area_scale, 1e9));
             return;
         }
-        if (drawsPatches(mesh, box, settings_) && !rasterize_all_) {
+        if (!rasterize_all_ &&
+            drawsPatches(mesh, box, p.camera_from_child.linear, view_, settings_)) {
             visitPatches(p, mesh, area_scale);
             return;
         }

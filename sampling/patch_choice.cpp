@@ -9,9 +9,11 @@ namespace stipple {
 
 namespace {
 
-// Where patches have no more than so many subpixels of the model's square, points on the mesh as a
-// whole cost less, measured: lists of what is visible have fewer of them.
-constexpr float kSubpixelsPerPatch = 96.0f;
+// Where the triangle at a place of the surface has no more than so many subpixels on average,
+// points on the mesh as a whole cost less, measured. But they leave some subpixels open, which show
+// where a pixel has few.
+constexpr double kSmallTriangle = 1.0, kSmallTriangleOfFew = 0.4;
+constexpr int kFewSubpixels = 2;    // along a pixel's side
 constexpr float kMostError = 0.5f;  // subpixels
 // Of coarser triangles none may be left to the z-buffer, which knows only the finest.
 constexpr double kBelowLarge = 0.9;
@@ -22,11 +24,25 @@ constexpr double kBelowLarge = 0.9;
 constexpr double kSurfelCost = 15.0, kPointCost = 60.0, kTriangleCost = 40.0, kSubpixelCost = 20.0,
                  kTextureCost = 200.0;
 
+// Area, object space: the mean over the surface, by octants and classes of area.
+double triangleAtAPlace(const Mesh& mesh) {
+    const MeshNode& root = mesh.nodes[0];
+    double sum = 0.0;
+    for (uint32_t c = root.first_child; c < root.first_child + root.child_count; ++c) {
+        const MeshNode& node = mesh.nodes[c];
+        sum += node.area * node.area / std::max(double(node.triangle_count), 1.0);
+    }
+    return root.child_count > 0 ? sum / root.area : root.max_triangle_area;
+}
+
 }  // namespace
 
-bool drawsPatches(const Mesh& mesh, const BoxProjection& box, const RenderSettings& settings) {
-    return !mesh.patches.empty() && box.size > float(settings.visible_size) &&
-           box.size * box.size > kSubpixelsPerPatch * float(mesh.patches.size());
+bool drawsPatches(const Mesh& mesh, const BoxProjection& box, const DMat3& camera_from_object,
+                  const View& view, const RenderSettings& settings) {
+    if (mesh.patches.empty() || box.size <= float(settings.visible_size)) return false;
+    const double small = view.subpixels > kFewSubpixels ? kSmallTriangle : kSmallTriangleOfFew;
+    return projectedArea(triangleAtAPlace(mesh), box.bound * maxAreaScale(camera_from_object)) >
+           small;
 }
 
 uint32_t choosePatch(const Scene& scene, const MeshPatch& patch, const BoxProjection& box,

@@ -12,7 +12,8 @@ namespace stipple {
 
 // Whether a hybrid model is drawn by its patches, not as the mesh it is, which serves far away.
 // box: of all of it.
-bool drawsPatches(const Mesh& mesh, const BoxProjection& box, const RenderSettings& settings);
+bool drawsPatches(const Mesh& mesh, const BoxProjection& box, const DMat3& camera_from_object,
+                  const View& view, const RenderSettings& settings);
 
 // The mesh that is drawn for the patch. box: of the patch; area_scale: largest of the instance.
 // Triangles take part where their error is below half a subpixel, surfels where they are as dense

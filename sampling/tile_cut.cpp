@@ -159,7 +159,8 @@ void TileCut::drawMesh(uint32_t mesh_index, uint32_t node_index, const Affine& c
                        uint64_t path, const BoxProjection& box) {
     const Mesh& mesh = context_.scene.meshes[mesh_index];
     if (mesh.triangles.empty() && !mesh.surfels) return;
-    if (node_index == 0 && drawsPatches(mesh, box, context_.settings)) {
+    if (node_index == 0 &&
+        drawsPatches(mesh, box, camera_from_object.linear, context_.view, context_.settings)) {
         drawPatches(mesh, camera_from_object, path);
         return;
     }

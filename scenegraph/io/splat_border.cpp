@@ -97,20 +97,18 @@ std::vector<Vec3> chooseLines(const std::vector<Vec2>& corners, const std::vecto
 
 }  // namespace
 
-void cutAtBorders(const SplatPoints& points, const PointIndex& index, std::vector<NearPoint>& near,
-                  Splat& splat) {
+void cutAtBorders(const PointIndex& index, Splat& splat) {
     // A hexagon around the ellipse is drawn.
     constexpr float kCorner = 1.1547f;
     const float a = (splat.long_radius + splat.gap) * kCorner,
                 b = (splat.short_radius + splat.gap) * kCorner;
     const Vec3 across = splat.across();
-    index.within(splat.center, a, near);
     std::vector<Vec2> within;
-    for (const NearPoint& n : near) {
-        const Vec3 d = points[n.index].position - splat.center;
+    index.forEachWithin(splat.center, a, [&](const PointIndex::Item& item) {
+        const Vec3 d = item.position - splat.center;
         const Vec2 p(glm::dot(d, splat.along), glm::dot(d, across)), u(p.x / a, p.y / b);
         if (glm::dot(u, u) <= 1.0f) within.push_back(p);
-    }
+    });
     within.push_back(Vec2(0));
     const std::vector<Vec2> hull = hullOf(within);
     // Lines beyond the hull's sides: (x, y, end).

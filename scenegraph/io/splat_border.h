@@ -10,7 +10,6 @@ namespace stipple {
 // Adds cuts to the splat where no point lies within what is drawn of it, as many as it may still
 // have: lines 1.5 spacings beyond sides of the points' hull that take away most.
 // O(m log m) of the m points within its reach.
-void cutAtBorders(const SplatPoints& points, const PointIndex& index, std::vector<NearPoint>& near,
-                  Splat& splat);
+void cutAtBorders(const PointIndex& index, Splat& splat);
 
 }  // namespace stipple

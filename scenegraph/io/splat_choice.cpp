@@ -123,11 +123,12 @@ void leaveOutCovered(std::vector<ChosenSplat>& splats, size_t n_points) {
 void findCovered(const Splat& splat, const SplatPoints& points, const PointIndex& index,
                  const SplatRules& rules, std::vector<uint32_t>& covered) {
     covered.clear();
-    index.forEachWithin(splat.center, splat.reach(rules.tolerance),
-                        [&](const PointIndex::Item& item) {
-                            if (covers(splat, points[item.index], rules))
-                                covered.push_back(item.index);
-                        });
+    index.forEachWithin(
+        splat.center, splat.reach(rules.tolerance), [&](const PointIndex::Item& item) {
+            // Points lie anywhere in memory: those beyond it are not waited for.
+            if (isInside(splat, item.position) && covers(splat, points[item.index], rules))
+                covered.push_back(item.index);
+        });
 }
 
 std::vector<ChosenSplat> chooseSplats(const SplatPoints& points, const PointIndex& index,

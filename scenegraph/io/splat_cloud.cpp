@@ -103,12 +103,16 @@ uint32_t SplatCloud::append(const std::vector<CloudPoint>& points) {
 
 // What covers its neighbours (near_) may cover it, or may not be what a cloud with it would have.
 void SplatCloud::placeBySplats(uint32_t i, std::vector<uint32_t>& wrong) {
+    // They lie anywhere in memory: to wait for all at once takes less time.
+    for (const NearPoint& p : near_) __builtin_prefetch(&splats_of_[p.index]);
+    for (const NearPoint& p : near_) __builtin_prefetch(splats_of_[p.index].data());
     std::vector<uint32_t> tried;
     for (const NearPoint& p : near_) {
         if (p.index == i) continue;
         for (const uint32_t s : splats_of_[p.index]) {
             if (std::find(tried.begin(), tried.end(), s) != tried.end()) continue;
             tried.push_back(s);
+            splats_[s].is_drawn = false;
             if (covers(splats_[s].splat, points_[i], rules_)) {
                 link(i, s);
             } else if (contradicts(points_[i], splats_[s].splat, rules_) &&
@@ -135,6 +139,7 @@ void SplatCloud::remove(const std::vector<uint32_t>& numbers) {
         index_.remove(i, points_[i].position);
         is_there_[i] = 0;
     }
+    removed_.insert(removed_.end(), numbers.begin(), numbers.end());
     std::vector<uint32_t> wrong;
     for (const uint32_t i : numbers) {
         index_.nearest(points_[i].position, 1, near_);
@@ -142,6 +147,7 @@ void SplatCloud::remove(const std::vector<uint32_t>& numbers) {
         const bool opens_hole = near_.empty() || near_[0].squared > closed * closed;
         for (const uint32_t s : splats_of_[i]) {
             Placed& placed = splats_[s];
+            placed.is_drawn = false;
             if (splats_of_[i].size() == 1 && --placed.n_alone == 0) not_needed_.push_back(s);
             if (--placed.n_points == 0) {
                 unused_.push_back(s);
@@ -163,7 +169,7 @@ void SplatCloud::add(const Splat& splat, const std::vector<uint32_t>& covered) {
         s = unused_.back();
         unused_.pop_back();
     }
-    splats_[s] = {splat, 0, 0, uint32_t(covered.size()), 0};
+    splats_[s] = {.splat = splat, .n_first = uint32_t(covered.size())};
     for (const uint32_t i : covered) link(i, s);
 }
 
@@ -231,7 +237,27 @@ void SplatCloud::coverUncovered() {
     not_needed_.clear();
 }
 
-SurfelModel SplatCloud::model() const {
+void SplatCloud::drawChanged() {
+    // Those that did not cover what went may end elsewhere now, too.
+    for (const uint32_t i : removed_) {
+        index_.nearest(points_[i].position, size_t(options_.neighbours), near_);
+        for (const NearPoint& p : near_) {
+            for (const uint32_t s : splats_of_[p.index]) splats_[s].is_drawn = false;
+        }
+    }
+    removed_.clear();
+    std::vector<uint32_t> covered;
+    for (Placed& placed : splats_) {
+        if (placed.n_points == 0 || placed.is_drawn) continue;
+        placed.drawn = placed.splat;
+        findCovered(placed.splat, points_, index_, rules_, covered);
+        bendNormals(points_, covered, placed.drawn);
+        if (rules_.has_cuts) cutAtBorders(index_, placed.drawn);
+        placed.is_drawn = true;
+    }
+}
+
+SurfelModel SplatCloud::model() {
     DBox3 bounds;
     double area = 0.0;
     for (size_t i = 0; i < points_.size(); ++i) {
@@ -241,15 +267,10 @@ SurfelModel SplatCloud::model() const {
     }
     if (bounds.isEmpty())
         throw Error(ErrorCode::kInvalidScene, "", "a cloud has no points to make splats of");
+    drawChanged();
     std::vector<Splat> splats;
-    std::vector<NearPoint> near;
-    std::vector<uint32_t> covered;
     for (const Placed& placed : splats_) {
-        if (placed.n_points == 0) continue;
-        splats.push_back(placed.splat);
-        findCovered(placed.splat, points_, index_, rules_, covered);
-        bendNormals(points_, covered, splats.back());
-        if (rules_.has_cuts) cutAtBorders(points_, index_, near, splats.back());
+        if (placed.n_points > 0) splats.push_back(placed.drawn);
     }
     SurfelFinish finish = finish_;
     finish.patch_width = float(glm::length(bounds.extent()));

@@ -42,8 +42,9 @@ public:
     double tolerance() const { return double(rules_.tolerance); }  // m
 
     // All splats as a model to draw (addSurfelModel() of io/surfel_file.h) or to write. Throws
-    // kInvalidScene if there are no points. O(points).
-    SurfelModel model() const;
+    // kInvalidScene if there are no points. O(splats), and of the points of those that have changed
+    // or lie next to what did since the last model; some nanoseconds a point for the bounds.
+    SurfelModel model();
 
 private:
     struct Placed {
@@ -52,6 +53,8 @@ private:
         uint32_t n_alone = 0;    // that no other covers
         uint32_t n_first = 0;    // that it covered when it was made
         uint32_t n_against = 0;  // points within it that it does not cover, since then
+        bool is_drawn = false;   // `drawn` is up to date
+        Splat drawn = {};        // with bent normals, and cut at borders
     };
 
     SplatPoint pointOf(const CloudPoint& point) const;
@@ -61,6 +64,7 @@ private:
     void link(uint32_t point, uint32_t splat);
     void removeSplats(const std::vector<uint32_t>& splats);
     void coverUncovered();
+    void drawChanged();
 
     const SplatOptions options_;
     SurfelFinish finish_;
@@ -74,6 +78,7 @@ private:
     std::vector<uint32_t> unused_;      // of splats_
     std::vector<uint32_t> uncovered_;   // points
     std::vector<uint32_t> not_needed_;  // splats whose points others cover, perhaps
+    std::vector<uint32_t> removed_;     // points, since the last model
     std::vector<NearPoint> near_;       // scratch
 };
 

@@ -141,9 +141,10 @@ bool SplatGrower::sortNext(size_t done) {
     return true;
 }
 
-// What is drawn reaches beyond what is covered; creases cut it there, too.
+// What is drawn reaches beyond what is covered, farther still where a gap has to be closed; creases
+// cut it there, too.
 void SplatGrower::cutRim(Grown& grown, uint32_t seed) {
-    constexpr float kDrawn = 1.2f;
+    constexpr float kDrawn = 1.5f;
     const SplatPoint& center = points_[seed];
     const float reach = kDrawn * grown.radius + 2.0f * center.spacing;
     lookAround(center.position, grown.frame, reach / std::sqrt(grown.frame.ratio), reach,

@@ -87,13 +87,11 @@ public:
         std::vector<Splat> splats;
         for (const ChosenSplat& s : chosen) splats.push_back(s.splat);
         if (!options_.naive) {
-            forEachSplat(splats.size(), [&](size_t k, std::vector<NearPoint>& near) {
-                if (rules.has_cuts) cutAtBorders(points_, index, near, splats[k]);
-            });
+            if (rules.has_cuts)
+                forEachSplat(splats.size(), [&](size_t k) { cutAtBorders(index, splats[k]); });
             narrowGaps(points_, index, chosen, splats, pool_, cancel_);
-            forEachSplat(splats.size(), [&](size_t k, std::vector<NearPoint>&) {
-                bendNormals(points_, chosen[k].covered, splats[k]);
-            });
+            forEachSplat(splats.size(),
+                         [&](size_t k) { bendNormals(points_, chosen[k].covered, splats[k]); });
         }
         // One surface, whose holes may be closed.
         for (SurfelFinish& finish : finishes_) finish.patch_width = float(diagonal);
@@ -117,9 +115,7 @@ private:
     void forEachSplat(size_t n, const Visit& visit) {
         constexpr size_t kChunk = 64;
         pool_.forEach((n + kChunk - 1) / kChunk, [&](size_t chunk, int) {
-            std::vector<NearPoint> near;
-            for (size_t k = chunk * kChunk; k < std::min(n, (chunk + 1) * kChunk); ++k)
-                visit(k, near);
+            for (size_t k = chunk * kChunk; k < std::min(n, (chunk + 1) * kChunk); ++k) visit(k);
         });
     }
 

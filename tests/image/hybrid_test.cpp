@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <render/compare.h>
 #include <render/renderer.h>
+#include <sampling/patch_choice.h>
 #include <scenegraph/io/hybrid.h>
 #include <scenegraph/io/hybrid_file.h>
 #include <scenegraph/io/load.h>
@@ -11,6 +12,7 @@
 #include <scenegraph/scene_editor.h>
 #include <tests/image/model_views.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 
@@ -59,6 +61,24 @@ TEST(Hybrid, looksLikeRaysAtAnyDistance) {
         EXPECT_GE(compareImages(picture, rays, pool).psnr, 28.0) << size;
         EXPECT_LE(compareImages(picture, rays, pool).holes->count, 0u) << size;
     }
+}
+
+TEST(Hybrid, isTheMeshWhereItsTrianglesAreSmall) {
+    ThreadPool pool(2);
+    const Scene model = modelOf(sourceOf(torus(), pool), HybridOptions(), pool);
+    const auto has_patches = [](const Mesh& mesh) { return !mesh.patches.empty(); };
+    const Mesh& mesh = *std::find_if(model.meshes.begin(), model.meshes.end(), has_patches);
+    const auto areDrawn = [&](double size, int subpixels) {
+        const View view =
+            makeView(cameraTo(model, maskDirectionOf(17), size, 160), 160, 160, subpixels);
+        const DMat3& rotation = view.camera_from_world;
+        const BoxProjection box =
+            projectBox(view, rotation, rotation * -view.eye_world, mesh.nodes[0].bounds);
+        return drawsPatches(mesh, box, rotation, view, RenderSettings());
+    };
+    EXPECT_FALSE(areDrawn(20.0, 4));
+    EXPECT_TRUE(areDrawn(40.0, 4));
+    EXPECT_TRUE(areDrawn(40.0, 2));  // a pixel of few subpixels: four open ones show
 }
 
 TEST(Hybrid, surfelsAloneLeaveNoHolesFromAnywhere) {

@@ -219,10 +219,15 @@ float reachOf(const SurfelModel& model) {
 TEST(Splats, nothingReachesBeyondABox) {
     ThreadPool pool(2);
     const CancelFlag cancel;
-    SplatReport report;
-    const SurfelModel model = buildSplats(
-        sourceOf(box()), optionsOf(0.1, false), pool, cancel, [](const char*, double) {}, report);
-    EXPECT_LE(reachOf(model), 0.5f + float(3.0 * report.tolerance));
+    const Scene source = sourceOf(box());
+    // Of the last, some splats hold as many points as one may before they reach an edge.
+    for (const SplatOptions& options :
+         {optionsOf(0.1, false), optionsOf(0.5, false), optionsOf(0.02, false, 200000)}) {
+        SplatReport report;
+        const SurfelModel model = buildSplats(
+            source, options, pool, cancel, [](const char*, double) {}, report);
+        EXPECT_LE(reachOf(model), 0.5f + float(3.0 * report.tolerance)) << options.tolerance;
+    }
 }
 
 // Where points end, splats end: a few spacings beyond, not half their width.

@@ -61,7 +61,7 @@ SplatOptions coarse() {
 TEST(SplatCloud, growsToWhatAFreshBuildMakes) {
     ThreadPool pool(2);
     std::vector<CloudPoint> all = sphere(8000);
-    const SplatCloud fresh(all, coarse(), pool);
+    SplatCloud fresh(all, coarse(), pool);
     // The upper half first, then the rest by hundreds.
     std::sort(all.begin(), all.end(),
               [](const CloudPoint& a, const CloudPoint& b) { return a.position.y > b.position.y; });
@@ -129,6 +129,30 @@ TEST(SplatCloud, aSurfaceThatMovesIsFollowed) {
     }
     EXPECT_EQ(cloud.pointCount(), 4000u);
     EXPECT_EQ(uncovered(after, cloud.model(), cloud.tolerance()), 0u);
+}
+
+// At borders, too, that come and go.
+TEST(SplatCloud, modelsBetweenEditsAreThoseThereWouldBeWithout) {
+    ThreadPool pool(2);
+    std::vector<CloudPoint> all = sphere(8000);
+    std::sort(all.begin(), all.end(),
+              [](const CloudPoint& a, const CloudPoint& b) { return a.position.y > b.position.y; });
+    const std::vector<CloudPoint> half(all.begin(), all.begin() + 4000);
+    SplatCloud often(half, coarse(), pool), once(half, coarse(), pool);
+    for (size_t i = 4000; i < 6000; i += 100) {
+        const std::vector<CloudPoint> more(all.begin() + std::ptrdiff_t(i),
+                                           all.begin() + std::ptrdiff_t(i) + 100);
+        for (SplatCloud* cloud : {&often, &once}) cloud->append(more);
+        often.model();
+    }
+    EXPECT_EQ(surfelFileText(often.model()), surfelFileText(once.model()));
+    for (uint32_t i = 5900; i >= 3000; i -= 100) {
+        std::vector<uint32_t> numbers;
+        for (uint32_t k = i; k < i + 100; ++k) numbers.push_back(k);
+        for (SplatCloud* cloud : {&often, &once}) cloud->remove(numbers);
+        often.model();
+    }
+    EXPECT_EQ(surfelFileText(often.model()), surfelFileText(once.model()));
 }
 
 TEST(SplatCloud, mayBecomeEmptyAndStartEmpty) {
