@@ -315,6 +315,32 @@ TEST(PointBlocks, backsHideNothingBehindThem) {
     EXPECT_LE(compareImages(points, rays, pool).holes->count, 4u);
 }
 
+// A parallelogram that is seen from where u turns to v counter-clockwise.
+void addPlate(Mesh& mesh, const Vec3& corner, const Vec3& u, const Vec3& v, const Vec3& normal) {
+    const uint32_t first = uint32_t(mesh.positions.size());
+    for (const Vec3& p : {corner, corner + u, corner + u + v, corner + v}) {
+        mesh.positions.push_back(p);
+        mesh.normals.push_back(normal);
+    }
+    mesh.triangles.emplace_back(first, first + 1u, first + 2u);
+    mesh.triangles.emplace_back(first, first + 2u, first + 3u);
+    mesh.triangle_material.resize(mesh.triangles.size(), 0);
+}
+// Shading normals smoothed over few triangles point away from where the surface is still seen.
+TEST(PointBlocks, conesHideNoSurfaceWhoseShadingNormalsPointAway) {
+    constexpr int kPixels = 96;
+    GeneratedMesh made = torus();
+    Mesh plate;
+    addPlate(plate, Vec3(-1, -1, 0), Vec3(2, 0, 0), Vec3(0, 2, 0), Vec3(0.766f, 0.0f, 0.643f));
+    made.mesh = std::move(plate);
+    ThreadPool pool(2);
+    const Pair pair = makePair(std::move(made), kPixels, pool);
+    const Camera camera = cameraTo(pair.source, Vec3(-0.85f, 0.0f, 0.527f), kPixels, kPixels, 1.0);
+    const Image rays = draw(pair.source, camera, kPixels, Method::kRaycast, 16, pool, 1),
+                points = draw(pair.model, camera, kPixels, Method::kPoints, 1, pool, 1);
+    EXPECT_EQ(compareImages(points, rays, pool).holes->count, 0u);
+}
+
 // Splats are no larger than what a point stands for, or both sides of a crease reach over it.
 TEST(PointBlocks, creasesOfWhatIsMagnifiedAreNarrowByEwa) {
     ThreadPool pool(2);
