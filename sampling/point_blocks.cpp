@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 namespace stipple {
 
@@ -45,7 +46,9 @@ namespace {
 
 constexpr float kEyeDistance = 20.0f;    // of orthographic rays, in radii: footprints hardly grow
 constexpr float kDepthTolerance = 2.0f;  // pixels: what lies no deeper is the same surface
-constexpr float kDiscReach = 0.625f;     // pixels: radius of what a sample makes up for
+constexpr float kDiscReach = 0.55f;      // pixels: radius of what a sample makes up for
+// Gaps are looked for from so many directions, by rays at every few places of each one's lattice.
+constexpr int kOpenDirections = 4096, kOpenStride = 4;
 constexpr int kRotations = 4, kShifts = 4, kTests = kRotations * kShifts;
 
 struct Sample {
@@ -128,6 +131,13 @@ Picture testPicture(const Vec3& to_viewer, int test, float pixel, float radius) 
     const float angle = float(test / kShifts) * float(kPi) / 8.0f;
     const Vec2 shift(test % 2 ? 0.5f : 0.0f, test % kShifts >= 2 ? 0.5f : 0.0f);
     return Picture(viewFromObject(to_viewer, angle), pixel, radius, shift);
+}
+
+// Spread evenly over the sphere: a Fibonacci lattice.
+Vec3 spreadDirection(int index, int count) {
+    const float y = 1.0f - (2.0f * float(index) + 1.0f) / float(count), r = std::sqrt(1.0f - y * y);
+    const double turn = double(index) * 2.399963229728653;
+    return Vec3(r * float(std::cos(turn)), y, r * float(std::sin(turn)));
 }
 
 constexpr int kAroundMiddle = 7, kMaskViews = kAroundMiddle + 6;
@@ -290,9 +300,15 @@ private:
         return s;
     }
 
-    // Rays on a lattice, towards -to_viewer.
-    void sampleView(const Vec3& to_viewer, float pixel, std::vector<Sample>& samples,
-                    std::vector<uint32_t>& block_begin) {
+    // Where rays towards -to_viewer pass: so far apart that surfaces tilted less than the tolerance
+    // angle are adequately sampled.
+    struct Lattice {
+        Vec3 to_viewer, u, v;  // u and v: steps in object space
+        int half_u, half_v;    // steps from the middle that reach to the borders
+
+        Vec3 at(int i, int j) const { return u * float(i) + v * float(j); }
+    };
+    Lattice makeLattice(const Vec3& to_viewer, float pixel) const {
         const Mat3 object_from_view = glm::transpose(viewFromObject(to_viewer, 0.0f));
         const float cosine = float(std::cos(radians(options_.tolerance_angle)));
         // Sides of the lattice's triangles are `spacing` long; of squares, the diagonals.
@@ -302,6 +318,15 @@ private:
                                              : Vec2(0.0f, spacing);
         const int half_v = int(std::ceil(radius_ / v.y)) + 1;
         const int half_u = int(std::ceil(radius_ / u.x + 0.5f * float(half_v))) + 1;
+        return {to_viewer, object_from_view * Vec3(u, 0.0f), object_from_view * Vec3(v, 0.0f),
+                half_u, half_v};
+    }
+
+    // Samples of the whole lattice.
+    void sampleView(const Vec3& to_viewer, float pixel, std::vector<Sample>& samples,
+                    std::vector<uint32_t>& block_begin) {
+        const Lattice lattice = makeLattice(to_viewer, pixel);
+        const int half_u = lattice.half_u, half_v = lattice.half_v;
         const int b = options_.block_size;
         const int columns = (2 * half_u + b) / b, rows = (2 * half_v + b) / b;
         std::vector<std::vector<Sample>> of_row(static_cast<size_t>(rows));
@@ -314,9 +339,9 @@ private:
                 rays.clear();
                 for (int k = 0; k < b * b; ++k) {
                     const int i = column * b + k % b - half_u, j = int(row) * b + k / b - half_v;
-                    const Vec2 q = u * float(i) + v * float(j);
+                    const Vec3 q = lattice.at(i, j);
                     if (glm::dot(q, q) > radius_ * radius_) continue;
-                    rays.push_back(rayThrough(object_from_view * Vec3(q, 0.0f), to_viewer));
+                    rays.push_back(rayThrough(q, to_viewer));
                 }
                 if (rays.empty()) continue;
                 cast(rays, pixel, hits);
@@ -440,46 +465,96 @@ private:
         }
     }
 
+    // A place of a lattice.
+    struct Place {
+        int i, j;
+    };
+
+    // Places of every few of the lattice whose rays find a surface that no disc covers.
+    std::vector<Place> findOpen(const Lattice& lattice, int first, float pixel,
+                                const CoverGrid& grid) {
+        constexpr int kStride = kOpenStride;
+        std::vector<Place> places, open;
+        std::vector<Ray> rays;
+        std::vector<RayHit> hits;
+        for (int j = first / kStride - lattice.half_v; j <= lattice.half_v; j += kStride) {
+            places.clear(), rays.clear();
+            for (int i = first % kStride - lattice.half_u; i <= lattice.half_u; i += kStride) {
+                const Vec3 q = lattice.at(i, j);
+                if (glm::dot(q, q) > radius_ * radius_) continue;
+                places.push_back({i, j});
+                rays.push_back(rayThrough(q, lattice.to_viewer));
+            }
+            cast(rays, pixel, hits);
+            for (size_t k = 0; k < rays.size(); ++k) {
+                if (!(hits[k].t < kInfinity)) continue;
+                const Sample s = sampleOf(rays[k], hits[k]);
+                if (!grid.covers(s.position, s.normal)) open.push_back(places[k]);
+            }
+        }
+        return open;
+    }
+
+    // Adds samples there and at the places around, as far as the surface is open.
+    void fillOpen(const Lattice& lattice, std::vector<Place> places, float pixel, CoverGrid& grid,
+                  std::vector<Sample>& chosen) {
+        std::set<std::pair<int, int>> visited;
+        for (const Place& p : places) visited.emplace(p.i, p.j);
+        std::vector<Place> next;
+        std::vector<Ray> rays;
+        std::vector<RayHit> hits;
+        std::vector<Sample> near;
+        while (!places.empty()) {
+            throwIfAsked();
+            rays.clear(), next.clear();
+            for (const Place& p : places)
+                rays.push_back(rayThrough(lattice.at(p.i, p.j), lattice.to_viewer));
+            cast(rays, pixel, hits);
+            for (size_t k = 0; k < rays.size(); ++k) {
+                if (!(hits[k].t < kInfinity)) continue;
+                near.assign(1, sampleOf(rays[k], hits[k]));
+                sampleBeside(near[0], lattice.to_viewer, pixel, near);
+                bool was_open = false;
+                for (const Sample& s : near) {
+                    if (grid.covers(s.position, s.normal)) continue;
+                    was_open = true;
+                    grid.add(s.position, s.normal);
+                    chosen.push_back(s);
+                }
+                if (!was_open) continue;
+                constexpr Place kAround[] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}};
+                for (const Place& step : kAround) {
+                    const Place p = {places[k].i + step.i, places[k].j + step.j};
+                    if (visited.emplace(p.i, p.j).second) next.push_back(p);
+                }
+            }
+            places.swap(next);
+        }
+    }
+
     // Adds what is seen from anywhere and no disc of a sample covers: surfaces that face between
-    // the projections, and those that all projections see at a slant.
+    // the projections, those that all projections see at a slant, and those that are seen through
+    // narrow openings, from few directions alone. So few rays are cast from each of many
+    // directions; around one that finds an open place, all are.
     void closeGaps(float pixel, const std::function<void(double)>& progress,
                    std::vector<Sample>& chosen) {
         CoverGrid grid(kDiscReach * pixel);
         for (const Sample& s : chosen) grid.add(s.position, s.normal);
-        std::vector<Sample> seen;
-        std::vector<uint32_t> ignored;
-        constexpr int kDirections = 2 * kMaskDirections;
-        for (int d = 0; d < kDirections; ++d) {
-            // Once more from between them.
-            const Mat3 turn = viewFromObject(glm::normalize(Vec3(1, 2, 3)), 0.35f);
-            const Vec3 to_viewer = d < kMaskDirections
-                                       ? maskDirectionOf(d)
-                                       : turn * maskDirectionOf(d - kMaskDirections);
-            seen.clear(), ignored.clear();
-            sampleView(to_viewer, pixel, seen, ignored);
-            constexpr size_t kChunk = 1024;
-            std::vector<std::vector<Sample>> open((seen.size() + kChunk - 1) / kChunk);
-            pool_.forEach(open.size(), [&](size_t chunk, int) {
+        constexpr int kTogether = 64;  // directions, which do not know of what the others find
+        std::vector<std::vector<Place>> open(kTogether);
+        for (int first = 0; first < kOpenDirections; first += kTogether) {
+            pool_.forEach(kTogether, [&](size_t k, int) {
                 throwIfAsked();
-                const size_t end = std::min(seen.size(), (chunk + 1) * kChunk);
-                std::vector<Sample> near;
-                for (size_t i = chunk * kChunk; i < end; ++i) {
-                    near.assign(1, seen[i]);
-                    sampleBeside(seen[i], to_viewer, pixel, near);
-                    for (const Sample& s : near) {
-                        if (!grid.covers(s.position, s.normal)) open[chunk].push_back(s);
-                    }
-                }
+                const int d = first + int(k);
+                open[k] = findOpen(makeLattice(spreadDirection(d, kOpenDirections), pixel),
+                                   d % (kOpenStride * kOpenStride), pixel, grid);
             });
-            for (const std::vector<Sample>& samples : open) {
-                for (const Sample& s : samples) {
-                    // By one that has just come, perhaps.
-                    if (grid.covers(s.position, s.normal)) continue;
-                    grid.add(s.position, s.normal);
-                    chosen.push_back(s);
-                }
+            for (int k = 0; k < kTogether; ++k) {
+                if (open[size_t(k)].empty()) continue;
+                fillOpen(makeLattice(spreadDirection(first + k, kOpenDirections), pixel),
+                         std::move(open[size_t(k)]), pixel, grid, chosen);
             }
-            progress(0.75 + 0.25 * double(d + 1) / kDirections);
+            progress(0.75 + 0.25 * double(first + kTogether) / kOpenDirections);
         }
     }
 

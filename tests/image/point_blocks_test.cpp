@@ -326,6 +326,41 @@ void addPlate(Mesh& mesh, const Vec3& corner, const Vec3& u, const Vec3& v, cons
     mesh.triangles.emplace_back(first, first + 2u, first + 3u);
     mesh.triangle_material.resize(mesh.triangles.size(), 0);
 }
+void addPlate(Mesh& mesh, const Vec3& corner, const Vec3& u, const Vec3& v) {
+    addPlate(mesh, corner, u, v, glm::normalize(glm::cross(u, v)));
+}
+
+// What lies behind an opening is seen from few directions, another part of it from each.
+TEST(PointBlocks, whatIsSeenThroughANarrowOpeningIsCovered) {
+    constexpr int kPixels = 128;
+    // A box with an opening in its top, and a floor that is seen through it alone.
+    constexpr float kSide = 0.6f, kOpen = 0.06f, kRest = kSide - kOpen;
+    const Vec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+    GeneratedMesh made = torus();
+    Mesh plates;
+    addPlate(plates, -kSide * (x + y + z), 2.0f * kSide * x, 2.0f * kSide * y);
+    for (const Mat3& turn : {Mat3(x, y, z), Mat3(y, -x, z), Mat3(-x, -y, z), Mat3(-y, x, z)}) {
+        addPlate(plates, turn * (-kSide * (x + y + z)), turn * (2.0f * kSide * x),
+                 2.0f * kSide * z);
+        addPlate(plates, turn * Vec3(-kSide, -kSide, kSide), turn * ((kSide + kOpen) * x),
+                 turn * (kRest * y));
+    }
+    made.mesh = std::move(plates);
+    ThreadPool pool(2);
+    const Pair pair = makePair(std::move(made), kPixels, pool);
+    uint64_t holes = 0;
+    for (int j = -3; j <= 3; ++j) {
+        for (int i = -3; i <= 3; ++i) {
+            const Vec3 from = glm::normalize(0.12f * (float(i) * x + float(j) * y) + z);
+            const Camera camera = cameraTo(pair.source, from, kPixels, kPixels, 1.0);
+            const Image rays = draw(pair.source, camera, kPixels, Method::kRaycast, 16, pool, 1),
+                        points = draw(pair.model, camera, kPixels, Method::kPoints, 1, pool, 1);
+            holes += compareImages(points, rays, pool).holes->count;
+        }
+    }
+    EXPECT_LE(holes, 2u);
+}
+
 // Shading normals smoothed over few triangles point away from where the surface is still seen.
 TEST(PointBlocks, conesHideNoSurfaceWhoseShadingNormalsPointAway) {
     constexpr int kPixels = 96;
