@@ -140,34 +140,29 @@ Vec3 spreadDirection(int index, int count) {
     return Vec3(r * float(std::cos(turn)), y, r * float(std::sin(turn)));
 }
 
-constexpr int kAroundMiddle = 7, kMaskViews = kAroundMiddle + 6;
+// From where it is found which blocks are seen, and for which mask directions that counts: for all
+// whose parts of the sphere lie near, as views do not see all that is seen from between them.
+struct MaskView {
+    Vec3 to_viewer;
+    std::array<uint64_t, 2> directions = {0, 0};  // a bit each
+};
 
-// From where a mask direction's bit is found: its middle, six places around it, and where its part
-// of the sphere reaches farthest, up to 17 degrees away. There up to six parts meet, and all look.
-std::vector<std::array<Vec3, kMaskViews>> maskViews() {
-    constexpr int kTried = 128 * kMaskDirections;
-    std::vector<std::vector<Vec3>> parts(kMaskDirections);
-    for (int i = 0; i < kTried; ++i) {  // a Fibonacci lattice
-        const float y = 1.0f - (2.0f * float(i) + 1.0f) / float(kTried),
-                    r = std::sqrt(1.0f - y * y);
-        const double turn = double(i) * 2.399963229728653;
-        const Vec3 direction(r * float(std::cos(turn)), y, r * float(std::sin(turn)));
-        parts[size_t(maskDirectionIndex(direction))].push_back(direction);
-    }
-    std::vector<std::array<Vec3, kMaskViews>> views(kMaskDirections);
-    for (size_t m = 0; m < views.size(); ++m) {
-        const Vec3 middle = maskDirectionOf(int(m));
-        for (int v = 0; v < kAroundMiddle; ++v) {
-            const Mat3 across = glm::transpose(viewFromObject(middle, float(v) * 1.0472f));
-            views[m][size_t(v)] = v == 0 ? middle : glm::normalize(middle + across[0] * 0.2f);
-        }
-        std::vector<float> nearest(parts[m].size(), -1.0f);  // cosine to the nearest view
-        for (size_t v = 1; v < kMaskViews; ++v) {
-            for (size_t i = 0; i < nearest.size(); ++i)
-                nearest[i] = std::max(nearest[i], glm::dot(parts[m][i], views[m][v - 1]));
-            if (v < kAroundMiddle) continue;
-            const auto farthest = std::min_element(nearest.begin(), nearest.end());
-            views[m][v] = parts[m][size_t(farthest - nearest.begin())];
+std::vector<MaskView> makeMaskViews() {
+    constexpr int kViews = 24 * kMaskDirections, kAround = 8;
+    constexpr float kMargin = 0.15f;  // radians, about: twice as far as views are apart
+    std::vector<MaskView> views(kViews);
+    for (int i = 0; i < kViews; ++i) {
+        MaskView& view = views[size_t(i)];
+        view.to_viewer = spreadDirection(i, kViews);
+        const auto add = [&](const Vec3& direction) {
+            const int m = maskDirectionIndex(direction);
+            view.directions[size_t(m / 64)] |= 1ull << (m % 64);
+        };
+        add(view.to_viewer);
+        for (int k = 0; k < kAround; ++k) {
+            const float angle = float(2.0 * kPi) * float(k) / kAround;
+            add(view.to_viewer +
+                glm::transpose(viewFromObject(view.to_viewer, angle))[0] * kMargin);
         }
     }
     return views;
@@ -220,7 +215,7 @@ public:
 
     // Which mask directions see each block.
     void findMasks(const std::vector<SurfelFinish>& finishes, float pixel, SurfelLevel& level) {
-        static const std::vector<std::array<Vec3, kMaskViews>> views = maskViews();
+        static const std::vector<MaskView> views = makeMaskViews();
         struct Seen {
             Vec3 position, normal;
             bool is_double_sided;
@@ -232,39 +227,34 @@ public:
                 points[i] = {s.position, s.normal, finishes[s.finish].material.double_sided};
             }
         }
-        std::vector<std::vector<uint8_t>> seen_from(kMaskDirections);
-        pool_.forEach(kMaskDirections, [&](size_t m, int) {
+        using Mask = std::array<uint64_t, 2>;
+        std::vector<std::vector<Mask>> of_worker(static_cast<size_t>(pool_.threadCount()),
+                                                 std::vector<Mask>(level.blocks.size(), {0, 0}));
+        pool_.forEach(views.size(), [&](size_t v, int worker) {
             throwIfAsked();
-            std::vector<uint8_t>& seen = seen_from[m];
-            seen.assign(level.blocks.size(), 0);
-            for (const Vec3& to_viewer : views[m]) {
-                Picture picture(viewFromObject(to_viewer, 0.0f), pixel, radius_, Vec2(0.0f));
-                // Backs are left out when a model is drawn: they hide nothing. Where a surface has
-                // an opening one sees through them what lies beyond.
-                for (const Seen& p : points) {
-                    if (p.is_double_sided || glm::dot(p.normal, to_viewer) > 0.0f)
-                        picture.draw(p.position);
-                }
-                for (size_t k = 0; k < level.blocks.size(); ++k) {
-                    const SurfelBlock& b = level.blocks[k];
-                    size_t ignored;
-                    for (uint32_t i = b.first; i < b.first + b.count && !seen[k]; ++i)
-                        seen[k] = picture.shows(points[i].position, ignored);
-                }
+            const Vec3& to_viewer = views[v].to_viewer;
+            Picture picture(viewFromObject(to_viewer, 0.0f), pixel, radius_, Vec2(0.0f));
+            // Backs are left out when a model is drawn: they hide nothing. Where a surface has an
+            // opening one sees through them what lies beyond.
+            for (const Seen& p : points) {
+                if (p.is_double_sided || glm::dot(p.normal, to_viewer) > 0.0f)
+                    picture.draw(p.position);
+            }
+            for (size_t k = 0; k < level.blocks.size(); ++k) {
+                const SurfelBlock& b = level.blocks[k];
+                bool is_seen = false;
+                size_t ignored;
+                for (uint32_t i = b.first; i < b.first + b.count && !is_seen; ++i)
+                    is_seen = picture.shows(points[i].position, ignored);
+                Mask& mask = of_worker[size_t(worker)][k];
+                for (size_t w = 0; is_seen && w < mask.size(); ++w)
+                    mask[w] |= views[v].directions[w];
             }
         });
-        // Few views see not all: what a neighbouring direction sees may be seen.
         for (size_t k = 0; k < level.blocks.size(); ++k) {
-            std::array<uint64_t, 2> bits = {0, 0};
-            for (int m = 0; m < kMaskDirections; ++m) {
-                for (int other = 0; other < kMaskDirections; ++other) {
-                    constexpr float kNear = 0.955f;
-                    if (seen_from[size_t(other)][k] &&
-                        glm::dot(maskDirectionOf(m), maskDirectionOf(other)) > kNear) {
-                        bits[size_t(m / 64)] |= 1ull << (m % 64);
-                        break;
-                    }
-                }
+            Mask bits = {0, 0};
+            for (const std::vector<Mask>& masks : of_worker) {
+                for (size_t w = 0; w < bits.size(); ++w) bits[w] |= masks[k][w];
             }
             level.blocks[k].visible_from = bits;
         }
