@@ -209,6 +209,7 @@ public:
         if (options_.partial) removeNeedless(pixel, chosen);
         progress(0.75);
         if (options_.complete) closeGaps(pixel, progress, chosen);
+        lookFromAbove(pixel, chosen);
         progress(1.0);
         return chosen;
     }
@@ -546,6 +547,32 @@ private:
             }
             progress(0.75 + 0.25 * double(first + kTogether) / kOpenDirections);
         }
+    }
+
+    // A ray that meets a surface at a slant finds the mean of a long strip of its textures. Samples
+    // are seen from anywhere: what each shows is looked up anew, of a circle around it.
+    void lookFromAbove(float pixel, std::vector<Sample>& samples) {
+        constexpr size_t kChunk = 4096;
+        constexpr float kDiameter = 1.41421356f, kSame = 0.1f;  // pixels: of a circle; depth
+        pool_.forEach((samples.size() + kChunk - 1) / kChunk, [&](size_t chunk, int) {
+            throwIfAsked();
+            const size_t first = chunk * kChunk, end = std::min(samples.size(), first + kChunk);
+            std::vector<Ray> rays;
+            for (size_t i = first; i < end; ++i) {
+                const Sample& s = samples[i];
+                rays.push_back({s.position + s.normal * pixel, 0.0f, -s.normal, 2.0f * pixel});
+            }
+            std::vector<RayHit> hits(rays.size());
+            caster_.cast(rays.data(), rays.size(), hits.data(), kDiameter);  // after a pixel's way
+            rays_cast_ += rays.size();
+            for (size_t k = 0; k < rays.size(); ++k) {
+                // Not if something stands in between, or the side above is a back.
+                if (!(std::abs(hits[k].t - pixel) <= kSame * pixel)) continue;
+                samples[first + k].albedo = hits[k].albedo;
+                samples[first + k].finish_key =
+                    finishKey(materials_, hits[k].material, hits[k].finish);
+            }
+        });
     }
 
     const RayCaster& caster_;

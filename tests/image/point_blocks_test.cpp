@@ -361,6 +361,53 @@ TEST(PointBlocks, whatIsSeenThroughANarrowOpeningIsCovered) {
     EXPECT_LE(holes, 2u);
 }
 
+// Walls of a narrow shaft: what is seen at a slant alone has the colour of its place nevertheless.
+TEST(PointBlocks, coloursAreThoseOfTheirPlacesHoweverTheyAreSeen) {
+    constexpr float kSide = 0.6f, kOpen = 0.05f, kRest = kSide - kOpen;
+    const Vec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+    GeneratedMesh made = torus();
+    Mesh shaft;
+    addPlate(shaft, Vec3(-kOpen, -kOpen, -kSide), 2.0f * kOpen * x, 2.0f * kOpen * y);
+    for (const Mat3& turn : {Mat3(x, y, z), Mat3(y, -x, z), Mat3(-x, -y, z), Mat3(-y, x, z)}) {
+        addPlate(shaft, turn * (-kSide * (x + y + z)), turn * (2.0f * kSide * x), 2.0f * kSide * z);
+        addPlate(shaft, turn * Vec3(-kSide, -kSide, kSide), turn * ((kSide + kOpen) * x),
+                 turn * (kRest * y));
+        addPlate(shaft, turn * Vec3(-kOpen, -kOpen, -kSide), 2.0f * kSide * z,
+                 turn * (2.0f * kOpen * x));
+    }
+    // Black above, white below.
+    for (const Vec3& p : shaft.positions) shaft.uvs.emplace_back(0.5f, 0.5f - 0.5f * p.z / kSide);
+    Texture halves;
+    constexpr int kTexels = 128;
+    halves.levels.resize(1);
+    halves.levels[0].width = halves.levels[0].height = kTexels;
+    for (int i = 0; i < kTexels * kTexels; ++i) {
+        const uint8_t v = i < kTexels * kTexels / 2 ? 0 : 255;
+        halves.levels[0].rgba.insert(halves.levels[0].rgba.end(), {v, v, v, 255});
+    }
+    buildMipmaps(halves);
+    made.mesh = std::move(shaft);
+    made.textures = {halves};
+    made.materials[0].base_texture = 0;
+    made.materials[0].base_color = Vec3(1.0f);
+    ThreadPool pool(2);
+    const Pair pair = makePair(std::move(made), 128, pool);
+    const SurfelLevel& level = pair.model.meshes[0].surfels->levels[0];
+    int of_shaft = 0, mixed = 0;
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            const float height = std::abs(s.position.z);
+            // Where the halves meet, and where the picture repeats.
+            if (height < 4.0f * level.spacing || height > 0.5f) continue;
+            of_shaft += std::abs(s.position.x) < 0.1f && std::abs(s.position.y) < 0.1f;
+            mixed += std::abs(s.albedo.g - (s.position.z < 0.0f ? 1.0f : 0.0f)) > 0.05f;
+        }
+    }
+    EXPECT_GT(of_shaft, 200);
+    EXPECT_EQ(mixed, 0);
+}
+
 // Shading normals smoothed over few triangles point away from where the surface is still seen.
 TEST(PointBlocks, conesHideNoSurfaceWhoseShadingNormalsPointAway) {
     constexpr int kPixels = 96;
