@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 namespace stipple {
 
@@ -45,7 +46,9 @@ namespace {
 
 constexpr float kEyeDistance = 20.0f;    // of orthographic rays, in radii: footprints hardly grow
 constexpr float kDepthTolerance = 2.0f;  // pixels: what lies no deeper is the same surface
-constexpr float kDiscReach = 0.625f;     // pixels: radius of what a sample makes up for
+constexpr float kDiscReach = 0.55f;      // pixels: radius of what a sample makes up for
+// Gaps are looked for from so many directions, by rays at every few places of each one's lattice.
+constexpr int kOpenDirections = 4096, kOpenStride = 4;
 constexpr int kRotations = 4, kShifts = 4, kTests = kRotations * kShifts;
 
 struct Sample {
@@ -130,34 +133,36 @@ Picture testPicture(const Vec3& to_viewer, int test, float pixel, float radius) 
     return Picture(viewFromObject(to_viewer, angle), pixel, radius, shift);
 }
 
-constexpr int kAroundMiddle = 7, kMaskViews = kAroundMiddle + 6;
+// Spread evenly over the sphere: a Fibonacci lattice.
+Vec3 spreadDirection(int index, int count) {
+    const float y = 1.0f - (2.0f * float(index) + 1.0f) / float(count), r = std::sqrt(1.0f - y * y);
+    const double turn = double(index) * 2.399963229728653;
+    return Vec3(r * float(std::cos(turn)), y, r * float(std::sin(turn)));
+}
 
-// From where a mask direction's bit is found: its middle, six places around it, and where its part
-// of the sphere reaches farthest, up to 17 degrees away. There up to six parts meet, and all look.
-std::vector<std::array<Vec3, kMaskViews>> maskViews() {
-    constexpr int kTried = 128 * kMaskDirections;
-    std::vector<std::vector<Vec3>> parts(kMaskDirections);
-    for (int i = 0; i < kTried; ++i) {  // a Fibonacci lattice
-        const float y = 1.0f - (2.0f * float(i) + 1.0f) / float(kTried),
-                    r = std::sqrt(1.0f - y * y);
-        const double turn = double(i) * 2.399963229728653;
-        const Vec3 direction(r * float(std::cos(turn)), y, r * float(std::sin(turn)));
-        parts[size_t(maskDirectionIndex(direction))].push_back(direction);
-    }
-    std::vector<std::array<Vec3, kMaskViews>> views(kMaskDirections);
-    for (size_t m = 0; m < views.size(); ++m) {
-        const Vec3 middle = maskDirectionOf(int(m));
-        for (int v = 0; v < kAroundMiddle; ++v) {
-            const Mat3 across = glm::transpose(viewFromObject(middle, float(v) * 1.0472f));
-            views[m][size_t(v)] = v == 0 ? middle : glm::normalize(middle + across[0] * 0.2f);
-        }
-        std::vector<float> nearest(parts[m].size(), -1.0f);  // cosine to the nearest view
-        for (size_t v = 1; v < kMaskViews; ++v) {
-            for (size_t i = 0; i < nearest.size(); ++i)
-                nearest[i] = std::max(nearest[i], glm::dot(parts[m][i], views[m][v - 1]));
-            if (v < kAroundMiddle) continue;
-            const auto farthest = std::min_element(nearest.begin(), nearest.end());
-            views[m][v] = parts[m][size_t(farthest - nearest.begin())];
+// From where it is found which blocks are seen, and for which mask directions that counts: for all
+// whose parts of the sphere lie near, as views do not see all that is seen from between them.
+struct MaskView {
+    Vec3 to_viewer;
+    std::array<uint64_t, 2> directions = {0, 0};  // a bit each
+};
+
+std::vector<MaskView> makeMaskViews() {
+    constexpr int kViews = 24 * kMaskDirections, kAround = 8;
+    constexpr float kMargin = 0.15f;  // radians, about: twice as far as views are apart
+    std::vector<MaskView> views(kViews);
+    for (int i = 0; i < kViews; ++i) {
+        MaskView& view = views[size_t(i)];
+        view.to_viewer = spreadDirection(i, kViews);
+        const auto add = [&](const Vec3& direction) {
+            const int m = maskDirectionIndex(direction);
+            view.directions[size_t(m / 64)] |= 1ull << (m % 64);
+        };
+        add(view.to_viewer);
+        for (int k = 0; k < kAround; ++k) {
+            const float angle = float(2.0 * kPi) * float(k) / kAround;
+            add(view.to_viewer +
+                glm::transpose(viewFromObject(view.to_viewer, angle))[0] * kMargin);
         }
     }
     return views;
@@ -204,13 +209,14 @@ public:
         if (options_.partial) removeNeedless(pixel, chosen);
         progress(0.75);
         if (options_.complete) closeGaps(pixel, progress, chosen);
+        lookFromAbove(pixel, chosen);
         progress(1.0);
         return chosen;
     }
 
     // Which mask directions see each block.
     void findMasks(const std::vector<SurfelFinish>& finishes, float pixel, SurfelLevel& level) {
-        static const std::vector<std::array<Vec3, kMaskViews>> views = maskViews();
+        static const std::vector<MaskView> views = makeMaskViews();
         struct Seen {
             Vec3 position, normal;
             bool is_double_sided;
@@ -222,39 +228,34 @@ public:
                 points[i] = {s.position, s.normal, finishes[s.finish].material.double_sided};
             }
         }
-        std::vector<std::vector<uint8_t>> seen_from(kMaskDirections);
-        pool_.forEach(kMaskDirections, [&](size_t m, int) {
+        using Mask = std::array<uint64_t, 2>;
+        std::vector<std::vector<Mask>> of_worker(static_cast<size_t>(pool_.threadCount()),
+                                                 std::vector<Mask>(level.blocks.size(), {0, 0}));
+        pool_.forEach(views.size(), [&](size_t v, int worker) {
             throwIfAsked();
-            std::vector<uint8_t>& seen = seen_from[m];
-            seen.assign(level.blocks.size(), 0);
-            for (const Vec3& to_viewer : views[m]) {
-                Picture picture(viewFromObject(to_viewer, 0.0f), pixel, radius_, Vec2(0.0f));
-                // Backs are left out when a model is drawn: they hide nothing. Where a surface has
-                // an opening one sees through them what lies beyond.
-                for (const Seen& p : points) {
-                    if (p.is_double_sided || glm::dot(p.normal, to_viewer) > 0.0f)
-                        picture.draw(p.position);
-                }
-                for (size_t k = 0; k < level.blocks.size(); ++k) {
-                    const SurfelBlock& b = level.blocks[k];
-                    size_t ignored;
-                    for (uint32_t i = b.first; i < b.first + b.count && !seen[k]; ++i)
-                        seen[k] = picture.shows(points[i].position, ignored);
-                }
+            const Vec3& to_viewer = views[v].to_viewer;
+            Picture picture(viewFromObject(to_viewer, 0.0f), pixel, radius_, Vec2(0.0f));
+            // Backs are left out when a model is drawn: they hide nothing. Where a surface has an
+            // opening one sees through them what lies beyond.
+            for (const Seen& p : points) {
+                if (p.is_double_sided || glm::dot(p.normal, to_viewer) > 0.0f)
+                    picture.draw(p.position);
+            }
+            for (size_t k = 0; k < level.blocks.size(); ++k) {
+                const SurfelBlock& b = level.blocks[k];
+                bool is_seen = false;
+                size_t ignored;
+                for (uint32_t i = b.first; i < b.first + b.count && !is_seen; ++i)
+                    is_seen = picture.shows(points[i].position, ignored);
+                Mask& mask = of_worker[size_t(worker)][k];
+                for (size_t w = 0; is_seen && w < mask.size(); ++w)
+                    mask[w] |= views[v].directions[w];
             }
         });
-        // Few views see not all: what a neighbouring direction sees may be seen.
         for (size_t k = 0; k < level.blocks.size(); ++k) {
-            std::array<uint64_t, 2> bits = {0, 0};
-            for (int m = 0; m < kMaskDirections; ++m) {
-                for (int other = 0; other < kMaskDirections; ++other) {
-                    constexpr float kNear = 0.955f;
-                    if (seen_from[size_t(other)][k] &&
-                        glm::dot(maskDirectionOf(m), maskDirectionOf(other)) > kNear) {
-                        bits[size_t(m / 64)] |= 1ull << (m % 64);
-                        break;
-                    }
-                }
+            Mask bits = {0, 0};
+            for (const std::vector<Mask>& masks : of_worker) {
+                for (size_t w = 0; w < bits.size(); ++w) bits[w] |= masks[k][w];
             }
             level.blocks[k].visible_from = bits;
         }
@@ -290,9 +291,15 @@ private:
         return s;
     }
 
-    // Rays on a lattice, towards -to_viewer.
-    void sampleView(const Vec3& to_viewer, float pixel, std::vector<Sample>& samples,
-                    std::vector<uint32_t>& block_begin) {
+    // Where rays towards -to_viewer pass: so far apart that surfaces tilted less than the tolerance
+    // angle are adequately sampled.
+    struct Lattice {
+        Vec3 to_viewer, u, v;  // u and v: steps in object space
+        int half_u, half_v;    // steps from the middle that reach to the borders
+
+        Vec3 at(int i, int j) const { return u * float(i) + v * float(j); }
+    };
+    Lattice makeLattice(const Vec3& to_viewer, float pixel) const {
         const Mat3 object_from_view = glm::transpose(viewFromObject(to_viewer, 0.0f));
         const float cosine = float(std::cos(radians(options_.tolerance_angle)));
         // Sides of the lattice's triangles are `spacing` long; of squares, the diagonals.
@@ -302,6 +309,15 @@ private:
                                              : Vec2(0.0f, spacing);
         const int half_v = int(std::ceil(radius_ / v.y)) + 1;
         const int half_u = int(std::ceil(radius_ / u.x + 0.5f * float(half_v))) + 1;
+        return {to_viewer, object_from_view * Vec3(u, 0.0f), object_from_view * Vec3(v, 0.0f),
+                half_u, half_v};
+    }
+
+    // Samples of the whole lattice.
+    void sampleView(const Vec3& to_viewer, float pixel, std::vector<Sample>& samples,
+                    std::vector<uint32_t>& block_begin) {
+        const Lattice lattice = makeLattice(to_viewer, pixel);
+        const int half_u = lattice.half_u, half_v = lattice.half_v;
         const int b = options_.block_size;
         const int columns = (2 * half_u + b) / b, rows = (2 * half_v + b) / b;
         std::vector<std::vector<Sample>> of_row(static_cast<size_t>(rows));
@@ -314,9 +330,9 @@ private:
                 rays.clear();
                 for (int k = 0; k < b * b; ++k) {
                     const int i = column * b + k % b - half_u, j = int(row) * b + k / b - half_v;
-                    const Vec2 q = u * float(i) + v * float(j);
+                    const Vec3 q = lattice.at(i, j);
                     if (glm::dot(q, q) > radius_ * radius_) continue;
-                    rays.push_back(rayThrough(object_from_view * Vec3(q, 0.0f), to_viewer));
+                    rays.push_back(rayThrough(q, to_viewer));
                 }
                 if (rays.empty()) continue;
                 cast(rays, pixel, hits);
@@ -440,47 +456,123 @@ private:
         }
     }
 
+    // A place of a lattice.
+    struct Place {
+        int i, j;
+    };
+
+    // Places of every few of the lattice whose rays find a surface that no disc covers.
+    std::vector<Place> findOpen(const Lattice& lattice, int first, float pixel,
+                                const CoverGrid& grid) {
+        constexpr int kStride = kOpenStride;
+        std::vector<Place> places, open;
+        std::vector<Ray> rays;
+        std::vector<RayHit> hits;
+        for (int j = first / kStride - lattice.half_v; j <= lattice.half_v; j += kStride) {
+            places.clear(), rays.clear();
+            for (int i = first % kStride - lattice.half_u; i <= lattice.half_u; i += kStride) {
+                const Vec3 q = lattice.at(i, j);
+                if (glm::dot(q, q) > radius_ * radius_) continue;
+                places.push_back({i, j});
+                rays.push_back(rayThrough(q, lattice.to_viewer));
+            }
+            cast(rays, pixel, hits);
+            for (size_t k = 0; k < rays.size(); ++k) {
+                if (!(hits[k].t < kInfinity)) continue;
+                const Sample s = sampleOf(rays[k], hits[k]);
+                if (!grid.covers(s.position, s.normal)) open.push_back(places[k]);
+            }
+        }
+        return open;
+    }
+
+    // Adds samples there and at the places around, as far as the surface is open.
+    void fillOpen(const Lattice& lattice, std::vector<Place> places, float pixel, CoverGrid& grid,
+                  std::vector<Sample>& chosen) {
+        std::set<std::pair<int, int>> visited;
+        for (const Place& p : places) visited.emplace(p.i, p.j);
+        std::vector<Place> next;
+        std::vector<Ray> rays;
+        std::vector<RayHit> hits;
+        std::vector<Sample> near;
+        while (!places.empty()) {
+            throwIfAsked();
+            rays.clear(), next.clear();
+            for (const Place& p : places)
+                rays.push_back(rayThrough(lattice.at(p.i, p.j), lattice.to_viewer));
+            cast(rays, pixel, hits);
+            for (size_t k = 0; k < rays.size(); ++k) {
+                if (!(hits[k].t < kInfinity)) continue;
+                near.assign(1, sampleOf(rays[k], hits[k]));
+                sampleBeside(near[0], lattice.to_viewer, pixel, near);
+                bool was_open = false;
+                for (const Sample& s : near) {
+                    if (grid.covers(s.position, s.normal)) continue;
+                    was_open = true;
+                    grid.add(s.position, s.normal);
+                    chosen.push_back(s);
+                }
+                if (!was_open) continue;
+                constexpr Place kAround[] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}};
+                for (const Place& step : kAround) {
+                    const Place p = {places[k].i + step.i, places[k].j + step.j};
+                    if (visited.emplace(p.i, p.j).second) next.push_back(p);
+                }
+            }
+            places.swap(next);
+        }
+    }
+
     // Adds what is seen from anywhere and no disc of a sample covers: surfaces that face between
-    // the projections, and those that all projections see at a slant.
+    // the projections, those that all projections see at a slant, and those that are seen through
+    // narrow openings, from few directions alone. So few rays are cast from each of many
+    // directions; around one that finds an open place, all are.
     void closeGaps(float pixel, const std::function<void(double)>& progress,
                    std::vector<Sample>& chosen) {
         CoverGrid grid(kDiscReach * pixel);
         for (const Sample& s : chosen) grid.add(s.position, s.normal);
-        std::vector<Sample> seen;
-        std::vector<uint32_t> ignored;
-        constexpr int kDirections = 2 * kMaskDirections;
-        for (int d = 0; d < kDirections; ++d) {
-            // Once more from between them.
-            const Mat3 turn = viewFromObject(glm::normalize(Vec3(1, 2, 3)), 0.35f);
-            const Vec3 to_viewer = d < kMaskDirections
-                                       ? maskDirectionOf(d)
-                                       : turn * maskDirectionOf(d - kMaskDirections);
-            seen.clear(), ignored.clear();
-            sampleView(to_viewer, pixel, seen, ignored);
-            constexpr size_t kChunk = 1024;
-            std::vector<std::vector<Sample>> open((seen.size() + kChunk - 1) / kChunk);
-            pool_.forEach(open.size(), [&](size_t chunk, int) {
+        constexpr int kTogether = 64;  // directions, which do not know of what the others find
+        std::vector<std::vector<Place>> open(kTogether);
+        for (int first = 0; first < kOpenDirections; first += kTogether) {
+            pool_.forEach(kTogether, [&](size_t k, int) {
                 throwIfAsked();
-                const size_t end = std::min(seen.size(), (chunk + 1) * kChunk);
-                std::vector<Sample> near;
-                for (size_t i = chunk * kChunk; i < end; ++i) {
-                    near.assign(1, seen[i]);
-                    sampleBeside(seen[i], to_viewer, pixel, near);
-                    for (const Sample& s : near) {
-                        if (!grid.covers(s.position, s.normal)) open[chunk].push_back(s);
-                    }
-                }
+                const int d = first + int(k);
+                open[k] = findOpen(makeLattice(spreadDirection(d, kOpenDirections), pixel),
+                                   d % (kOpenStride * kOpenStride), pixel, grid);
             });
-            for (const std::vector<Sample>& samples : open) {
-                for (const Sample& s : samples) {
-                    // By one that has just come, perhaps.
-                    if (grid.covers(s.position, s.normal)) continue;
-                    grid.add(s.position, s.normal);
-                    chosen.push_back(s);
-                }
+            for (int k = 0; k < kTogether; ++k) {
+                if (open[size_t(k)].empty()) continue;
+                fillOpen(makeLattice(spreadDirection(first + k, kOpenDirections), pixel),
+                         std::move(open[size_t(k)]), pixel, grid, chosen);
             }
-            progress(0.75 + 0.25 * double(d + 1) / kDirections);
+            progress(0.75 + 0.25 * double(first + kTogether) / kOpenDirections);
         }
+    }
+
+    // A ray that meets a surface at a slant finds the mean of a long strip of its textures. Samples
+    // are seen from anywhere: what each shows is looked up anew, of a circle around it.
+    void lookFromAbove(float pixel, std::vector<Sample>& samples) {
+        constexpr size_t kChunk = 4096;
+        constexpr float kDiameter = 1.41421356f, kSame = 0.1f;  // pixels: of a circle; depth
+        pool_.forEach((samples.size() + kChunk - 1) / kChunk, [&](size_t chunk, int) {
+            throwIfAsked();
+            const size_t first = chunk * kChunk, end = std::min(samples.size(), first + kChunk);
+            std::vector<Ray> rays;
+            for (size_t i = first; i < end; ++i) {
+                const Sample& s = samples[i];
+                rays.push_back({s.position + s.normal * pixel, 0.0f, -s.normal, 2.0f * pixel});
+            }
+            std::vector<RayHit> hits(rays.size());
+            caster_.cast(rays.data(), rays.size(), hits.data(), kDiameter);  // after a pixel's way
+            rays_cast_ += rays.size();
+            for (size_t k = 0; k < rays.size(); ++k) {
+                // Not if something stands in between, or the side above is a back.
+                if (!(std::abs(hits[k].t - pixel) <= kSame * pixel)) continue;
+                samples[first + k].albedo = hits[k].albedo;
+                samples[first + k].finish_key =
+                    finishKey(materials_, hits[k].material, hits[k].finish);
+            }
+        });
     }
 
     const RayCaster& caster_;

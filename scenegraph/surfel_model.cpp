@@ -4,6 +4,7 @@
 #include <core/error.h>
 #include <core/image.h>
 #include <core/octahedral.h>
+#include <scenegraph/disc_planes.h>
 #include <scenegraph/morton.h>
 #include <scenegraph/visible_area.h>
 
@@ -122,26 +123,32 @@ size_t SurfelModel::bytes() const {
 namespace {
 
 // The visibility cone of points with these normals (PSR, section 6.3), a little wider than it
-// must be: normals may be interpolated ones.
-void makeCone(const std::vector<Surfel>& surfels, size_t begin, size_t end, SurfelBlock& block) {
+// must be. is_shading: normals may be those of no surface, smoothed over few triangles: the planes
+// through the points face away, too, where nothing is seen.
+void makeCone(const Surfel* surfels, int count, bool is_shading, float spacing,
+              SurfelBlock& block) {
     constexpr float kSlack = 0.25f;  // radians
+    std::array<Vec3, 2 * kBlockSurfels> normals;
     Vec3 axis(0.0f), mean(0.0f);
-    for (size_t i = begin; i < end; ++i) {
+    for (int i = 0; i < count; ++i) {
+        normals[size_t(i)] = surfels[i].normal;
         axis += surfels[i].normal;
-        mean += surfels[i].position / float(end - begin);
+        mean += surfels[i].position / float(count);
     }
     const float length = glm::length(axis);
-    if (length < 0.5f * float(end - begin)) return;
+    if (length < 0.5f * float(count)) return;
     axis /= length;
+    if (is_shading) discPlanes(spacing, surfels, count, normals.data() + count);
+    const int n_normals = is_shading ? 2 * count : count;
     float least = 1.0f;
-    for (size_t i = begin; i < end; ++i) least = std::min(least, glm::dot(axis, surfels[i].normal));
+    for (int i = 0; i < n_normals; ++i) least = std::min(least, glm::dot(axis, normals[size_t(i)]));
     const float angle = std::acos(std::clamp(least, -1.0f, 1.0f)) + kSlack;
     if (angle >= 1.5f) return;
     float t = kInfinity;
-    for (size_t i = begin; i < end; ++i) {
-        const Surfel& s = surfels[i];
-        t = std::min(
-            t, glm::dot(s.position - mean, s.normal) / std::max(glm::dot(axis, s.normal), 0.1f));
+    for (int i = 0; i < n_normals; ++i) {
+        const Vec3& normal = normals[size_t(i)];
+        t = std::min(t, glm::dot(surfels[i % count].position - mean, normal) /
+                            std::max(glm::dot(axis, normal), 0.1f));
     }
     block.cone_axis = axis;
     block.cone_apex = mean + axis * (t - 0.05f * glm::length(block.bounds.extent()));
@@ -274,7 +281,9 @@ SurfelLevel packSurfels(std::vector<Surfel> surfels, const std::vector<SurfelFin
         }
         block.first = uint32_t(begin);
         block.count = uint32_t(end - begin);
-        if (is_single_sided) makeCone(sorted, begin, end, block);
+        if (is_single_sided)
+            makeCone(&sorted[begin], int(block.count), discs == SurfelDiscs::kAlike, spacing,
+                     block);
         const Vec3 extent = block.bounds.extent();
         for (size_t i = begin; i < end; ++i) {
             const Surfel& s = sorted[i];

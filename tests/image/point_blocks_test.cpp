@@ -315,6 +315,114 @@ TEST(PointBlocks, backsHideNothingBehindThem) {
     EXPECT_LE(compareImages(points, rays, pool).holes->count, 4u);
 }
 
+// A parallelogram that is seen from where u turns to v counter-clockwise.
+void addPlate(Mesh& mesh, const Vec3& corner, const Vec3& u, const Vec3& v, const Vec3& normal) {
+    const uint32_t first = uint32_t(mesh.positions.size());
+    for (const Vec3& p : {corner, corner + u, corner + u + v, corner + v}) {
+        mesh.positions.push_back(p);
+        mesh.normals.push_back(normal);
+    }
+    mesh.triangles.emplace_back(first, first + 1u, first + 2u);
+    mesh.triangles.emplace_back(first, first + 2u, first + 3u);
+    mesh.triangle_material.resize(mesh.triangles.size(), 0);
+}
+void addPlate(Mesh& mesh, const Vec3& corner, const Vec3& u, const Vec3& v) {
+    addPlate(mesh, corner, u, v, glm::normalize(glm::cross(u, v)));
+}
+
+// What lies behind an opening is seen from few directions, another part of it from each.
+TEST(PointBlocks, whatIsSeenThroughANarrowOpeningIsCovered) {
+    constexpr int kPixels = 128;
+    // A box with an opening in its top, and a floor that is seen through it alone.
+    constexpr float kSide = 0.6f, kOpen = 0.06f, kRest = kSide - kOpen;
+    const Vec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+    GeneratedMesh made = torus();
+    Mesh plates;
+    addPlate(plates, -kSide * (x + y + z), 2.0f * kSide * x, 2.0f * kSide * y);
+    for (const Mat3& turn : {Mat3(x, y, z), Mat3(y, -x, z), Mat3(-x, -y, z), Mat3(-y, x, z)}) {
+        addPlate(plates, turn * (-kSide * (x + y + z)), turn * (2.0f * kSide * x),
+                 2.0f * kSide * z);
+        addPlate(plates, turn * Vec3(-kSide, -kSide, kSide), turn * ((kSide + kOpen) * x),
+                 turn * (kRest * y));
+    }
+    made.mesh = std::move(plates);
+    ThreadPool pool(2);
+    const Pair pair = makePair(std::move(made), kPixels, pool);
+    uint64_t holes = 0;
+    for (int j = -3; j <= 3; ++j) {
+        for (int i = -3; i <= 3; ++i) {
+            const Vec3 from = glm::normalize(0.12f * (float(i) * x + float(j) * y) + z);
+            const Camera camera = cameraTo(pair.source, from, kPixels, kPixels, 1.0);
+            const Image rays = draw(pair.source, camera, kPixels, Method::kRaycast, 16, pool, 1),
+                        points = draw(pair.model, camera, kPixels, Method::kPoints, 1, pool, 1);
+            holes += compareImages(points, rays, pool).holes->count;
+        }
+    }
+    EXPECT_LE(holes, 2u);
+}
+
+// Walls of a narrow shaft: what is seen at a slant alone has the colour of its place nevertheless.
+TEST(PointBlocks, coloursAreThoseOfTheirPlacesHoweverTheyAreSeen) {
+    constexpr float kSide = 0.6f, kOpen = 0.05f, kRest = kSide - kOpen;
+    const Vec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
+    GeneratedMesh made = torus();
+    Mesh shaft;
+    addPlate(shaft, Vec3(-kOpen, -kOpen, -kSide), 2.0f * kOpen * x, 2.0f * kOpen * y);
+    for (const Mat3& turn : {Mat3(x, y, z), Mat3(y, -x, z), Mat3(-x, -y, z), Mat3(-y, x, z)}) {
+        addPlate(shaft, turn * (-kSide * (x + y + z)), turn * (2.0f * kSide * x), 2.0f * kSide * z);
+        addPlate(shaft, turn * Vec3(-kSide, -kSide, kSide), turn * ((kSide + kOpen) * x),
+                 turn * (kRest * y));
+        addPlate(shaft, turn * Vec3(-kOpen, -kOpen, -kSide), 2.0f * kSide * z,
+                 turn * (2.0f * kOpen * x));
+    }
+    // Black above, white below.
+    for (const Vec3& p : shaft.positions) shaft.uvs.emplace_back(0.5f, 0.5f - 0.5f * p.z / kSide);
+    Texture halves;
+    constexpr int kTexels = 128;
+    halves.levels.resize(1);
+    halves.levels[0].width = halves.levels[0].height = kTexels;
+    for (int i = 0; i < kTexels * kTexels; ++i) {
+        const uint8_t v = i < kTexels * kTexels / 2 ? 0 : 255;
+        halves.levels[0].rgba.insert(halves.levels[0].rgba.end(), {v, v, v, 255});
+    }
+    buildMipmaps(halves);
+    made.mesh = std::move(shaft);
+    made.textures = {halves};
+    made.materials[0].base_texture = 0;
+    made.materials[0].base_color = Vec3(1.0f);
+    ThreadPool pool(2);
+    const Pair pair = makePair(std::move(made), 128, pool);
+    const SurfelLevel& level = pair.model.meshes[0].surfels->levels[0];
+    int of_shaft = 0, mixed = 0;
+    for (const SurfelBlock& block : level.blocks) {
+        for (uint32_t i = block.first; i < block.first + block.count; ++i) {
+            const Surfel s = unpackSurfel(level, block, i);
+            const float height = std::abs(s.position.z);
+            // Where the halves meet, and where the picture repeats.
+            if (height < 4.0f * level.spacing || height > 0.5f) continue;
+            of_shaft += std::abs(s.position.x) < 0.1f && std::abs(s.position.y) < 0.1f;
+            mixed += std::abs(s.albedo.g - (s.position.z < 0.0f ? 1.0f : 0.0f)) > 0.05f;
+        }
+    }
+    EXPECT_GT(of_shaft, 200);
+    EXPECT_EQ(mixed, 0);
+}
+
+// Shading normals smoothed over few triangles point away from where the surface is still seen.
+TEST(PointBlocks, conesHideNoSurfaceWhoseShadingNormalsPointAway) {
+    constexpr int kPixels = 96;
+    GeneratedMesh made = torus();
+    Mesh plate;
+    addPlate(plate, Vec3(-1, -1, 0), Vec3(2, 0, 0), Vec3(0, 2, 0), Vec3(0.766f, 0.0f, 0.643f));
+    made.mesh = std::move(plate);
+    ThreadPool pool(2);
+    const Pair pair = makePair(std::move(made), kPixels, pool);
+    const Camera camera = cameraTo(pair.source, Vec3(-0.85f, 0.0f, 0.527f), kPixels, kPixels, 1.0);
+    const Image rays = draw(pair.source, camera, kPixels, Method::kRaycast, 16, pool, 1),
+                points = draw(pair.model, camera, kPixels, Method::kPoints, 1, pool, 1);
+    EXPECT_EQ(compareImages(points, rays, pool).holes->count, 0u);
+}
+
 // Splats are no larger than what a point stands for, or both sides of a crease reach over it.
 TEST(PointBlocks, creasesOfWhatIsMagnifiedAreNarrowByEwa) {
     ThreadPool pool(2);
