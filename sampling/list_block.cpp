@@ -106,20 +106,16 @@ void prefilter(const Scene& scene, const Mesh& mesh, Point& p) {
 // The instances on the way to a point of a group's list, from the group inwards: visit(group, place
 // in its InstanceStore) each. Returns the branch at the list's node.
 template <class Visit>
-uint8_t visitInstances(const Scene& scene, uint32_t group_index, uint32_t node, const PointKey& key,
+uint8_t visitInstances(const Scene& scene, uint32_t group_index, uint32_t node, WayNumbers& way,
                        const Visit& visit) {
-    uint64_t hash = hashCombine(key.list, key.index, 8);
-    ChosenInstance chosen =
-        chooseInstance(scene, scene.groups[group_index], node, listPosition(key), hash);
-    const uint8_t branch = chosen.branch;
-    for (;;) {
+    for (uint8_t branch = 0, level = 0;; level = 1, node = 0) {
         const Group& group = scene.groups[group_index];
+        const ChosenInstance chosen = chooseInstance(scene, group, node, way);
+        if (level == 0) branch = chosen.branch;
         visit(group_index, chosen.instance);
         const ChildRef child = group.instances.child(chosen.instance);
         if (!child.isGroup()) return branch;
-        hash = hashCombine(hash, group.listed_index[chosen.instance]);
         group_index = child.index();
-        chosen = chooseInstance(scene, scene.groups[group_index], 0, uniformDouble(hash), hash);
     }
 }
 
@@ -131,7 +127,8 @@ Point makeGroupPoint(const Scene& scene, uint32_t outermost, uint32_t node, cons
     uint64_t path = 0;
     uint32_t instance = 0, mesh_index = 0;
     int levels = 0;
-    const uint8_t branch = visitInstances(scene, outermost, node, key, [&](uint32_t g, uint32_t i) {
+    WayNumbers way(key);
+    const uint8_t branch = visitInstances(scene, outermost, node, way, [&](uint32_t g, uint32_t i) {
         const Group& group = scene.groups[g];
         if (levels++ == 0) instance = i;
         group_from_mesh = group_from_mesh * group.instances.groupFromChild(i);
@@ -142,9 +139,8 @@ Point makeGroupPoint(const Scene& scene, uint32_t outermost, uint32_t node, cons
     area_scale = std::max(area_scale, 1e-30);
     const Mesh& mesh = scene.meshes[mesh_index];
     const float length_scale = float(std::sqrt(area_scale));
-    const double position = uniformDouble(hashCombine(key.list, key.index, path, 9));
     Point p =
-        makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], position, key, layers);
+        makeMeshPoint(scene, mesh, mesh.cumulative_area, mesh.nodes[0], way.next(), key, layers);
     const bool is_deep = scene.groups[outermost].depth > 1;
     if (is_deep) prefilter(scene, mesh, p);
     // Drawn for the largest area scale of the transform; this orientation's may be smaller.
@@ -289,9 +285,9 @@ void remakeListPoints(const ListSource& source, const GroupEdits& edits, uint32_
     // Groups that reside there may have changed within.
     const bool is_deep = group.depth > 1;
     if (is_deep) std::fill_n(is_changed + Branches::kChildren, Branches::kKinds, true);
-    for (const auto& [g, listed] : edits.instances) {
-        if (g == group_index) is_changed[Branches::codeOfResident(listed)] = true;
-    }
+    for (auto i = edits.instances.lower_bound({group_index, 0});
+         i != edits.instances.end() && i->first == group_index; ++i)
+        is_changed[Branches::codeOfResident(i->second)] = true;
     PointKey key = listKey(source, first);
     for (int lane = 0; lane < kBlockPoints; ++lane, ++key.index) {
         uint32_t& instance = block.instance[lane];
@@ -306,7 +302,8 @@ void remakeListPoints(const ListSource& source, const GroupEdits& edits, uint32_
         uint64_t path = 0;
         uint32_t place = 0;
         int levels = 0;
-        visitInstances(scene, group_index, name.node, key, [&](uint32_t g, uint32_t i) {
+        WayNumbers way(key);
+        visitInstances(scene, group_index, name.node, way, [&](uint32_t g, uint32_t i) {
             const uint32_t listed = scene.groups[g].listed_index[i];
             is_edited |= edits.instances.contains({g, listed});
             path = extendObjectPath(path, listed);

@@ -11,6 +11,8 @@
 #include <scenegraph/visible_area.h>
 
 #include <set>
+#include <utility>
+#include <vector>
 
 namespace stipple {
 
@@ -67,7 +69,7 @@ struct ListName {
 };
 
 // What positions of a list are quantized to: of meshes the node's bounds; of groups a box around
-// them that seldom changes when they do, up to three times as wide.
+// them that seldom changes when they do, up to four times as wide.
 Box3 listBox(const Scene& scene, ChildRef child, uint32_t node);
 
 // What lists are made of. visible: of the mesh from the list's direction; null for whole lists.

@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <sampling/list_point.h>
 
-#include <core/rng.h>
+#include <core/low_discrepancy.h>
 
 #include <algorithm>
 
 namespace stipple {
 
+namespace {
+
+// The index, bit-reversed. Sixteen points in a row fall into sixteen strata, in an order of their
+// own: a run of one point may lie anywhere, wherever in the sequence it begins.
+uint32_t reversedIndex(const PointKey& key) {
+    const uint32_t order = uint32_t(hashCombine(key.list, key.index >> 4, 4)) << 28;
+    return reverseBits(key.index) ^ order;
+}
+
+}  // namespace
+
 double listPosition(const PointKey& key) {
     if (key.sampler == Sampler::kRandom) return uniformDouble(hashCombine(key.list, key.index));
-    // Sixteen points in a row fall into sixteen strata, in an order of their own: a run of one
-    // point may lie anywhere, wherever in the sequence it begins.
-    const uint32_t order = uint32_t(hashCombine(key.list, key.index >> 4, 4)) << 28;
-    const double t = double(reverseBits(key.index) ^ order) * 0x1p-32 + uniformDouble(key.list);
+    const double t = double(reversedIndex(key)) * 0x1p-32 + uniformDouble(key.list);
     return t - std::floor(t);
 }
 
@@ -70,6 +78,14 @@ template MeshPoint meshPointAt(const std::vector<double>&, const MeshNode&, doub
                                const PointKey&);
 template MeshPoint meshPointAt(const std::vector<float>&, const MeshNode&, double, const PointKey&);
 
+namespace {
+
+double areaOf(const Scene& scene, const Group& group, uint32_t instance) {
+    return childArea(scene, group.instances.child(instance)) * group.instances.areaScale(instance);
+}
+
+}  // namespace
+
 InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node_index,
                          double position) {
     const GroupNode* node = &group.nodes[node_index];
@@ -93,21 +109,12 @@ InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node_i
     }
     const uint32_t end = node->first + node->resident_count;
     for (uint32_t i = node->first;; ++i) {
-        const ChildRef child = group.instances.child(i);
-        const double area = childArea(scene, child) * group.instances.areaScale(i);
+        const double area = areaOf(scene, group, i);
         if (target < area || i + 1 >= end)
             return {i, area > 0.0 ? std::clamp(target / area, 0.0, 0x1.fffffep-1) : 0.0};
         target -= area;
     }
 }
-
-namespace {
-
-double areaOf(const Scene& scene, const Group& group, uint32_t instance) {
-    return childArea(scene, group.instances.child(instance)) * group.instances.areaScale(instance);
-}
-
-}  // namespace
 
 Branches::Branches(const Scene& scene, const Group& group, uint32_t node_index) {
     const GroupNode& node = group.nodes[node_index];
@@ -130,19 +137,29 @@ uint8_t Branches::at(double u) const {
     return last;
 }
 
+double WayNumbers::next() {
+    const int dimension = dimension_++;
+    if (dimension == 0) return listPosition(key_);
+    if (dimension >= kSobolDimensions || key_.sampler == Sampler::kRandom)
+        return uniformDouble(hashCombine(way_, key_.index, uint32_t(dimension), 4));
+    const uint32_t x = sobol(dimension, reverseBits(reversedIndex(key_)));
+    return double(owenScrambled(x, uint32_t(mixBits(way_)))) * 0x1p-32;
+}
+
 namespace {
 
 // A reservoir of one: each takes the place of those before it with the share that it adds to them.
 // From the last on, as the first of these to do so is the one. sum: of their areas.
 uint32_t chooseResident(const Scene& scene, const Group& group, const GroupNode& node, uint8_t code,
-                        double sum, uint64_t hash) {
+                        double sum, const WayNumbers& way) {
     uint32_t chosen = node.first;
     for (uint32_t i = node.first + node.resident_count; i-- > node.first;) {
-        if (Branches::codeOfResident(group.listed_index[i]) != code) continue;
+        const uint32_t listed = group.listed_index[i];
+        if (Branches::codeOfResident(listed) != code) continue;
         const double area = areaOf(scene, group, i);
         if (!(area > 0.0)) continue;
         chosen = i;
-        if (uniformDouble(hashCombine(hash, group.listed_index[i])) * sum < area) break;
+        if (uniformDouble(way.hash(listed)) * sum < area) break;
         sum -= area;
     }
     return chosen;
@@ -150,21 +167,21 @@ uint32_t chooseResident(const Scene& scene, const Group& group, const GroupNode&
 
 }  // namespace
 
-ChosenInstance chooseInstance(const Scene& scene, const Group& group, uint32_t node, double u,
-                              uint64_t hash) {
+ChosenInstance chooseInstance(const Scene& scene, const Group& group, uint32_t node,
+                              WayNumbers& way) {
     ChosenInstance result;
     for (bool is_first = true;; is_first = false) {
         const Branches branches(scene, group, node);
-        const uint8_t code = branches.at(u);
+        const uint8_t code = branches.at(way.next());
         if (is_first) result.branch = code;
         if (!Branches::isChild(code)) {
-            result.instance = chooseResident(scene, group, group.nodes[node], code,
-                                             branches.area[code], mixBits(hash));
+            result.instance =
+                chooseResident(scene, group, group.nodes[node], code, branches.area[code], way);
+            way.goToInstance(group.listed_index[result.instance]);
             return result;
         }
         node = group.nodes[node].first_child + code;
-        hash = hashCombine(hash, node);
-        u = uniformDouble(hash);
+        way.goToChild(node);
     }
 }
 

@@ -5,6 +5,7 @@
 // remainder steers a 4-way subdivision of the triangle).
 #pragma once
 
+#include <core/rng.h>
 #include <core/settings.h>
 #include <scenegraph/scene.h>
 
@@ -46,9 +47,9 @@ InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node, 
 // Where one may go on from a group's node: to a child, or to the residents of one of eight kinds,
 // by their names. Their codes: the child's number, or eight and the kind.
 struct Branches {
-    static constexpr uint8_t kChildren = 8, kKinds = 8;
+    static constexpr uint8_t kChildren = 8, kKinds = 16;
     static uint8_t codeOfResident(uint32_t listed_index) {
-        return uint8_t(kChildren + listed_index % kKinds);
+        return uint8_t(kChildren + mixBits32(listed_index) % kKinds);
     }
     static bool isChild(uint8_t code) { return code < kChildren; }
 
@@ -61,16 +62,35 @@ struct Branches {
     double sum = 0.0;
 };
 
+// The random numbers of a list's point on its way down a group's octree, and those within. Every
+// place on the way has its own, so none changes when others do; all points of a list that come by
+// there have numbers that are spread evenly, as far as Sobol's dimensions go.
+class WayNumbers {
+public:
+    explicit WayNumbers(const PointKey& key) : key_(key), way_(key.list) {}
+
+    // For the next choice, in [0, 1). The first is listPosition().
+    double next();
+    // Only for this place, for each of what is there.
+    uint64_t hash(uint32_t what) const { return hashCombine(way_, key_.index, what, 3); }
+    void goToChild(uint32_t node) { way_ = hashCombine(way_, node, 1); }
+    void goToInstance(uint32_t listed_index) { way_ = hashCombine(way_, listed_index, 2); }
+
+private:
+    PointKey key_;
+    uint64_t way_;
+    int dimension_ = 0;
+};
+
 struct ChosenInstance {
     uint32_t instance = 0;  // its place in the InstanceStore
     uint8_t branch = 0;     // of the node where the way begins
 };
 
-// An instance below a node, in proportion to areas as instanceAt(), by a random number for each
-// node and instance on the way: made of `hash` and what names them, but for the first, u. Where
-// areas change, so do few of the choices: of those that fell elsewhere about the share of the
-// change in the sum. O(log n + residents).
-ChosenInstance chooseInstance(const Scene& scene, const Group& group, uint32_t node, double u,
-                              uint64_t hash);
+// An instance below a node, in proportion to areas as instanceAt(). Where areas change, so do few
+// of the choices: of those that fell elsewhere about the share of the change in the sum. The way
+// goes on to the instance. O(log n + residents).
+ChosenInstance chooseInstance(const Scene& scene, const Group& group, uint32_t node,
+                              WayNumbers& way);
 
 }  // namespace stipple

@@ -439,8 +439,7 @@ private:
 
     // More samples beside one that its projection sees at a slant, as close along the surface as
     // others are.
-    void sampleBeside(const Sample& s, const Vec3& to_viewer, float pixel,
-                      std::vector<Sample>& samples) {
+    void sampleBeside(Sample s, const Vec3& to_viewer, float pixel, std::vector<Sample>& samples) {
         constexpr float kMostSteps = 8.0f;
         const int steps = int(std::min(1.0f / std::max(s.facing, 1e-3f), kMostSteps));
         const Vec3 across = s.normal - to_viewer * glm::dot(s.normal, to_viewer);

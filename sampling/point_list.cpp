@@ -2,6 +2,7 @@
 #include <sampling/point_list.h>
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <utility>
 
@@ -257,6 +258,15 @@ void PointLists::sceneChanged(const SceneChanges& changes) {
             putAside({ChildRef::group(changed_node.group), changed_node.node}, false);
     }
     for (const InstanceId& id : changes.instances) edits_.instances.emplace(id.group, id.index);
+    // To go through so many takes longer than to make lists anew; and where none waits for them,
+    // edits are forgotten.
+    constexpr size_t kMostEdits = 2048;
+    if (edits_.nodes.size() + edits_.instances.size() > kMostEdits) {
+        for (Outdated& outdated : outdated_) outdated.is_whole = true;
+        updateNames();
+    } else if (outdated_.empty()) {
+        updateNames();
+    }
     for (const uint32_t group : changed) {
         Slots& slots = group_slots_[group];
         const size_t n = scene_.groups[group].nodes.size();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The points of a node of a mesh, or of a group that is instanced often: an endless sequence
 // (list_block.h), and a cache of the sequences' beginnings. With the stratified sampler every
-// prefix is well spread over the node's area: the index, bit-reversed, runs along the distribution
-// list, whose triangles are in Morton order, or along the children of a group's node. Based on:
-// Wand et al. 2001 ("Sample caching").
+// prefix is well spread over the area of a mesh's node: the index, bit-reversed, runs along the
+// distribution list, whose triangles are in Morton order. In groups it is spread well over a node's
+// children, and less so over theirs. Based on: Wand et al. 2001 ("Sample caching").
 #pragma once
 
 #include <core/parallel.h>

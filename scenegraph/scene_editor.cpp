@@ -308,6 +308,7 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     const int depth_before = group.depth;
     buildGroup(scene_, group, scene_.path + ": /groups/" + group.name, pool);
     group.as_child = as_child;
+    updateSlack(group_index);
     setBounds(group);
     deepen(group_index, std::exchange(group.depth, depth_before));
     open_[group_index].reset();
@@ -423,6 +424,7 @@ InstanceId SceneEditor::findOwn(const std::vector<uint32_t>& path) {
             markEdited(id);
             noteMember(id);
             addUse(id, below, lengthScale(scene_.groups[id.group].instances, slot));
+            updateSlack(id.group);
             refreshUpwards(id.group, open_[id.group]->node_of[slot]);
         }
         id.group = below.index();
@@ -490,23 +492,29 @@ void SceneEditor::groupChanged(uint32_t index, Dirty& dirty) {
     setOutgrown(index, 0.0, dirty);
 }
 
-// Gives the groups that hold it the slack that they need for all that they hold.
 void SceneEditor::setOutgrown(uint32_t index, double length, Dirty& dirty) {
     if (std::exchange(outgrown_[index], length) == length) return;
     for (const auto& [holder, held] : holders_[index]) {
-        double slack = 0.0;
-        for (uint32_t g = 0; g < holders_.size(); ++g) {
-            const auto found = outgrown_[g] > 0.0 ? holders_[g].find(holder) : holders_[g].end();
-            if (found != holders_[g].end())
-                slack = std::max(slack, outgrown_[g] * found->second.length_scale);
-        }
-        constexpr double kRounding = 1.01;
-        Group& group = scene_.groups[holder];
-        if (float(slack * kRounding) == group.slack) continue;
-        group.slack = float(slack * kRounding);
-        rebuilt_.push_back(holder);
-        dirty[{group.depth, holder}];
+        if (updateSlack(holder)) dirty[{scene_.groups[holder].depth, holder}];
     }
+}
+
+// What it needs for all that it holds. Says whether that is another than before: then its bounds
+// have to be set.
+bool SceneEditor::updateSlack(uint32_t holder) {
+    double slack = 0.0;
+    for (uint32_t g = 0; g < holders_.size(); ++g) {
+        if (!(outgrown_[g] > 0.0)) continue;
+        const auto found = holders_[g].find(holder);
+        if (found != holders_[g].end())
+            slack = std::max(slack, outgrown_[g] * found->second.length_scale);
+    }
+    constexpr double kRounding = 1.01;
+    Group& group = scene_.groups[holder];
+    if (float(slack * kRounding) == group.slack) return false;
+    group.slack = float(slack * kRounding);
+    rebuilt_.push_back(holder);
+    return true;
 }
 
 void SceneEditor::setBounds(Group& group) const {

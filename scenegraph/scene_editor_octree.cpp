@@ -24,6 +24,7 @@ uint32_t capacityFor(uint32_t count) { return std::bit_ceil(std::max(count, 4u))
 
 void SceneEditor::place(InstanceId id, ChildRef child, const Affine& group_from_child) {
     addUse(id, child, maxLengthScale(group_from_child.linear));
+    if (child.isGroup()) updateSlack(id.group);
     markEdited(id);
     noteMember(id);
     if (child.isGroup()) deepen(id.group, scene_.groups[child.index()].depth + 1);
@@ -54,6 +55,7 @@ void SceneEditor::take(InstanceId id) {
     if (instanceBox(childSums(scene_, child), group.instances.groupFromChild(slot), center, half))
         noteBox(id.group, {center - half, center + half});
     removeUse(id, child);
+    if (child.isGroup()) updateSlack(id.group);
     markEdited(id);
     noteMember(id);
     const bool is_group = child.isGroup();

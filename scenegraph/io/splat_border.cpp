@@ -7,6 +7,8 @@ namespace stipple {
 
 namespace {
 
+constexpr float kCorner = 1.1547f;  // a hexagon around the ellipse is drawn
+
 constexpr float kBorderGap = 1.5f;  // spacings between a cut and the last point
 // A cut that takes away less than this share of what is left is not worth its triangle.
 constexpr float kLeastShare = 0.06f;
@@ -97,11 +99,10 @@ std::vector<Vec3> chooseLines(const std::vector<Vec2>& corners, const std::vecto
 
 }  // namespace
 
+float drawnReach(const Splat& splat) { return (splat.long_radius + splat.gap) * kCorner; }
+
 void cutAtBorders(const PointIndex& index, Splat& splat) {
-    // A hexagon around the ellipse is drawn.
-    constexpr float kCorner = 1.1547f;
-    const float a = (splat.long_radius + splat.gap) * kCorner,
-                b = (splat.short_radius + splat.gap) * kCorner;
+    const float a = drawnReach(splat), b = (splat.short_radius + splat.gap) * kCorner;
     const Vec3 across = splat.across();
     std::vector<Vec2> within;
     index.forEachWithin(splat.center, a, [&](const PointIndex::Item& item) {

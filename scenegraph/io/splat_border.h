@@ -7,6 +7,9 @@
 
 namespace stipple {
 
+// How far what is drawn of a splat lies from its centre, at most.
+float drawnReach(const Splat& splat);
+
 // Adds cuts to the splat where no point lies within what is drawn of it, as many as it may still
 // have: lines 1.5 spacings beyond sides of the points' hull that take away most.
 // O(m log m) of the m points within its reach.

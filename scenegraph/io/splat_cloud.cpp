@@ -95,6 +95,7 @@ uint32_t SplatCloud::append(const std::vector<CloudPoint>& points) {
         points_[i].is_at_crease = beside != Vec3(0.0f);
         if (points_[i].is_at_crease) points_[i].normal = beside;
         placeBySplats(i, wrong);
+        changed_.push_back(i);
     }
     removeSplats(wrong);
     coverUncovered();
@@ -112,7 +113,6 @@ void SplatCloud::placeBySplats(uint32_t i, std::vector<uint32_t>& wrong) {
         for (const uint32_t s : splats_of_[p.index]) {
             if (std::find(tried.begin(), tried.end(), s) != tried.end()) continue;
             tried.push_back(s);
-            splats_[s].is_drawn = false;
             if (covers(splats_[s].splat, points_[i], rules_)) {
                 link(i, s);
             } else if (contradicts(points_[i], splats_[s].splat, rules_) &&
@@ -139,7 +139,7 @@ void SplatCloud::remove(const std::vector<uint32_t>& numbers) {
         index_.remove(i, points_[i].position);
         is_there_[i] = 0;
     }
-    removed_.insert(removed_.end(), numbers.begin(), numbers.end());
+    changed_.insert(changed_.end(), numbers.begin(), numbers.end());
     std::vector<uint32_t> wrong;
     for (const uint32_t i : numbers) {
         index_.nearest(points_[i].position, 1, near_);
@@ -147,7 +147,6 @@ void SplatCloud::remove(const std::vector<uint32_t>& numbers) {
         const bool opens_hole = near_.empty() || near_[0].squared > closed * closed;
         for (const uint32_t s : splats_of_[i]) {
             Placed& placed = splats_[s];
-            placed.is_drawn = false;
             if (splats_of_[i].size() == 1 && --placed.n_alone == 0) not_needed_.push_back(s);
             if (--placed.n_points == 0) {
                 unused_.push_back(s);
@@ -238,23 +237,27 @@ void SplatCloud::coverUncovered() {
 }
 
 void SplatCloud::drawChanged() {
-    // Those that did not cover what went may end elsewhere now, too.
-    for (const uint32_t i : removed_) {
-        index_.nearest(points_[i].position, size_t(options_.neighbours), near_);
-        for (const NearPoint& p : near_) {
-            for (const uint32_t s : splats_of_[p.index]) splats_[s].is_drawn = false;
-        }
-    }
-    removed_.clear();
+    constexpr size_t kMostPairs = size_t(1) << 27;  // beyond, all are made anew
+    const bool are_many = changed_.size() * splats_.size() > kMostPairs;
     std::vector<uint32_t> covered;
     for (Placed& placed : splats_) {
-        if (placed.n_points == 0 || placed.is_drawn) continue;
+        if (placed.n_points == 0) continue;
+        const float reach =
+            std::max(drawnReach(placed.splat), placed.splat.reach(rules_.tolerance));
+        const auto isReached = [&](uint32_t point) {
+            const Vec3 d = points_[point].position - placed.splat.center;
+            return glm::dot(d, d) <= reach * reach;
+        };
+        if (placed.is_drawn && !are_many &&
+            std::none_of(changed_.begin(), changed_.end(), isReached))
+            continue;
         placed.drawn = placed.splat;
         findCovered(placed.splat, points_, index_, rules_, covered);
         bendNormals(points_, covered, placed.drawn);
         if (rules_.has_cuts) cutAtBorders(index_, placed.drawn);
         placed.is_drawn = true;
     }
+    changed_.clear();
 }
 
 SurfelModel SplatCloud::model() {

@@ -42,8 +42,9 @@ public:
     double tolerance() const { return double(rules_.tolerance); }  // m
 
     // All splats as a model to draw (addSurfelModel() of io/surfel_file.h) or to write. Throws
-    // kInvalidScene if there are no points. O(splats), and of the points of those that have changed
-    // or lie next to what did since the last model; some nanoseconds a point for the bounds.
+    // kInvalidScene if there are no points. O(splats x points that came or went since the last
+    // model), and of the points of the splats that reach these; some nanoseconds a point for the
+    // bounds.
     SurfelModel model();
 
 private:
@@ -78,7 +79,7 @@ private:
     std::vector<uint32_t> unused_;      // of splats_
     std::vector<uint32_t> uncovered_;   // points
     std::vector<uint32_t> not_needed_;  // splats whose points others cover, perhaps
-    std::vector<uint32_t> removed_;     // points, since the last model
+    std::vector<uint32_t> changed_;     // points that came or went since the last model
     std::vector<NearPoint> near_;       // scratch
 };
 

@@ -277,6 +277,17 @@ TEST(SceneEditor, groupsInstancedOftenMayOutgrowTheirBounds) {
         EXPECT_NEAR(scene.groups[g].bounds.max.y, before.groups[g].bounds.max.y, 1e-4);
     }
 
+    // What comes to hold it needs slack, too, as large as it is shown there.
+    editor.restore(id, ChildRef::mesh(0), above);
+    const InstanceId larger = editor.insert(0, ChildRef::group(1), {DMat3(5.0), DVec3(0)}),
+                     other = editor.insert(2, ChildRef::group(1), {DMat3(2.0), DVec3(0)});
+    for (const Group& group : scene.groups) expectEnclosed(scene, group);
+    EXPECT_NEAR(scene.groups[0].slack, 17.5, 0.5);
+    editor.remove(larger);
+    editor.remove(other);
+    for (const Group& group : scene.groups) expectEnclosed(scene, group);
+    editor.remove(id);
+
     // So far out that slack would serve nobody.
     editor.takeChanges();
     editor.insert(1, ChildRef::mesh(0), {DMat3(1.0), DVec3(0, 1000, 0)});
@@ -323,7 +334,8 @@ TEST(SceneEditor, pointsFallOnInstancesByTheirAreas) {
     std::map<uint32_t, double> along, chosen;
     for (int i = 0; i < kDraws; ++i) {
         ++along[instanceAt(scene, group, 0, rng.uniform(0.0, 1.0)).instance];
-        ++chosen[chooseInstance(scene, group, 0, rng.uniform(0.0, 1.0), rng.next()).instance];
+        WayNumbers way({Sampler::kStratified, rng.next(), uint32_t(i)});
+        ++chosen[chooseInstance(scene, group, 0, way).instance];
     }
     for (auto& hits : {along, chosen}) {
         double chi_square = 0.0, categories = 0.0;
@@ -372,6 +384,34 @@ size_t expectLists(const Scene& scene, PointLists& lists, uint32_t group_index) 
         ++n;
     }
     return n;
+}
+
+// One list's points fall on a group's instances, and on what is within these, evenly.
+TEST(SceneEditor, aListsPointsAreSpreadEvenly) {
+    Scene scene = makeScene(1, 0);
+    Group row, field;
+    for (int i = 0; i < 32; ++i)
+        row.instances.add(ChildRef::mesh(0), {DMat3(1.0), DVec3(2.0 * i, 0, 0)});
+    for (int i = 0; i < 32; ++i)
+        field.instances.add(ChildRef::group(0), {DMat3(1.0), DVec3(0, 0, 2.0 * i)});
+    scene.groups = {row, field};
+    scene.root = 1;
+    ThreadPool pool(1);
+    buildScene(scene, pool);
+    const ListIdentity identity;
+    const ListName name{ChildRef::group(1), 0};
+    std::map<uint32_t, int> hits;  // by the path to one of 1024 boxes
+    constexpr int kAsMany = 16, kAll = 1024 * kAsMany;
+    for (uint32_t first = 0; first < kAll; first += kBlockPoints) {
+        ListBlock block;
+        makeListPoints({scene, identity, name}, first, kBlockPoints, block);
+        for (const uint32_t path : block.instance) ++hits[path];
+    }
+    EXPECT_EQ(hits.size(), 1024u) << "random ones leave none out, either";
+    double chi_square = 0.0;
+    for (const auto& [path, n] : hits)
+        chi_square += double((n - kAsMany) * (n - kAsMany)) / kAsMany;
+    EXPECT_LT(chi_square, 0.75 * 1024) << "random ones have 1024";
 }
 
 // Lists of what did not change are kept; all hold what they would if they were made now.
