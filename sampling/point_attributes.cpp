@@ -21,6 +21,7 @@ void pointAttributes(const Scene& scene, const View& view, const Run& run, const
     sample.material = list.material[lane];
     sample.alpha = float(list.alpha[lane]) / 255.0f;
     sample.patch_width = patchWidth(list.width[lane], kFirstMetreExponent) * run.length_scale;
+    sample.shadow_slack = 0.0f;
     const Material& material = scene.materials[sample.material];
     uint64_t path = run.path;
     const Group* group = run.child.isGroup() ? &scene.groups[run.child.index()] : nullptr;

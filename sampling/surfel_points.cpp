@@ -465,14 +465,31 @@ void SurfelPoints::drawDiscs(const Placed& placed, const SurfelBlock& b) {
 
 namespace {
 
-// Object space, unit.
+// Radians. Splats that bend by less stand out by the bends of those beside them, too.
+constexpr float kLittleBend = 0.2f;
+// Of its own and of one beside: heights of a bend.
+constexpr float kSplatSlack = 1.5f;
+
+// By how much a flat splat and those beside it may lie off each other where they stand for one bent
+// surface. Object space, m.
+float heightOfBend(const SurfelModel& model, const SurfelLevel& level, const Surfel& s) {
+    const float long_axis =
+        level.spacing * s.radius_share * model.discSide() / (kSidePerRadius * std::sqrt(s.ratio));
+    const Vec3 turn = glm::abs(s.bend) * Vec3(1.0f, s.ratio * s.ratio, 2.0f * s.ratio);
+    const float bend = std::max({turn.x, turn.y, turn.z});
+    return 0.5f * kSplatSlack * long_axis * (bend + std::min(bend, kLittleBend));
+}
+
+// Object space, unit. slack: SurfaceSample::shadow_slack, object space.
 Vec3 normalAt(const TileContext& context, const SurfelModel& model, const SurfelLevel& level,
-              const Run& run, uint32_t index, const Vec3& position_camera) {
+              const Run& run, uint32_t index, const Vec3& position_camera, float& slack) {
+    slack = 0.0f;
     if (run.frame == kNoFrame) return unpackNormal16(level.normal[index]);
     const auto after =
         std::upper_bound(level.blocks.begin(), level.blocks.end(), index,
                          [](uint32_t i, const SurfelBlock& block) { return i < block.first; });
     const Surfel s = unpackSurfel(level, *(after - 1), index);
+    slack = heightOfBend(model, level, s);
     const Affine& to_camera = context.frames[run.frame].camera_from_object;
     const DVec3 offset = DVec3(position_camera) - to_camera.point(DVec3(s.position));
     return bentNormal(level, s, model.discSide(), Vec3(glm::inverse(to_camera.linear) * offset));
@@ -508,7 +525,9 @@ void surfelAttributes(const TileContext& context, const Run& run, uint32_t index
         std::max(mesh.surfels->finishes[finish].patch_width, side) * run.length_scale;
     sample.object = objectId(run.path);
     const Mat3& world_from_camera = context.view.world_from_camera;
-    const Vec3 normal = normalAt(context, *mesh.surfels, level, run, index, sample.position_camera);
+    const Vec3 normal = normalAt(context, *mesh.surfels, level, run, index, sample.position_camera,
+                                 sample.shadow_slack);
+    sample.shadow_slack *= run.length_scale;
     sample.normal_world = glm::normalize(world_from_camera * (run.camera_from_normal * normal));
     if (run.frame != kNoFrame) {
         const Vec3 to_eye = context.view.orthographic

@@ -48,6 +48,7 @@ void triangleAttributes(const Scene& scene, const View& view, const InstanceFram
         scene.materials[sample.material].alpha_mode == AlphaMode::kBlend ? surface.alpha : 1.0f;
     sample.patch_width = mesh.strata[mesh.triangle_stratum[triangle]].patch_width *
                          float(std::sqrt(frame.area_scale));
+    sample.shadow_slack = 0.0f;
     sample.object = objectId(frame.path);
 }
 

@@ -28,8 +28,11 @@ struct SurfaceSample {
     SurfaceFinish finish;
     float alpha = 1.0f;             // of blended surfaces that are drawn in layers
     float patch_width = kInfinity;  // of the connected patch (a leaf, a terrain), metres
-    uint32_t material = 0;          // index into Scene::materials
-    uint32_t object = 0;            // hash of the instance path, 0 where there is nothing
+    // What is drawn lies off the surface it stands for by about this: nothing nearer casts a shadow
+    // on it. Metres, 0 where it is exact.
+    float shadow_slack = 0.0f;
+    uint32_t material = 0;  // index into Scene::materials
+    uint32_t object = 0;    // hash of the instance path, 0 where there is nothing
 };
 
 }  // namespace stipple

@@ -116,13 +116,14 @@ float ShadowPages::litShare(const Map& map, const SurfaceSample& sample) const {
         const int x0 = int(x), y0 = int(y);
         const float fx = x - float(x0), fy = y - float(y0);
         const float most = depthOfPatch(sample.patch_width, texel);
+        const float towards_light =
+            std::min(std::max(kBias * texel, sample.shadow_slack) / size, most);
         float visible = 0.0f;
         for (int k = 0; k < 4; ++k) {
             const int dx = k & 1, dy = k >> 1;
             const float to_texel =
                 texel * (slope_x * (float(dx) - fx) + slope_y * (float(dy) - fy));
-            const float plane =
-                p.z + std::clamp(to_texel, -most, most) - std::min(kBias * texel / size, most);
+            const float plane = p.z + std::clamp(to_texel, -most, most) - towards_light;
             const float depth = depthAt(level, x0 + dx, y0 + dy);
             const float weight = (dx ? fx : 1.0f - fx) * (dy ? fy : 1.0f - fy);
             if (std::isnan(depth)) {

@@ -75,8 +75,9 @@ public:
 
     // Percentage-closer: of the 2 x 2 texels around the sample, weighted by nearness, those that do
     // not see anything in front of it. 1 where no page is. Every texel is compared with the plane
-    // through the sample along its normal, moved towards the light by kBias texels: a point that
-    // made a texel lies up to a texel beside its centre. Closer than that nothing casts a shadow.
+    // through the sample along its normal, moved towards the light by kBias texels, or by the
+    // sample's slack if that is more: a point that made a texel lies up to a texel beside its
+    // centre. Closer than that nothing casts a shadow.
     float ofSun(size_t sun, const SurfaceSample& sample) const override;
     float ofLamp(size_t lamp, const SurfaceSample& sample) const override;
 

@@ -319,6 +319,44 @@ TEST(Splats, aPlaneIsClosedFromJustAboveIt) {
     }
 }
 
+// Seen close, where shadow maps know depths more exactly than the splats have them.
+TEST(Splats, curvedSurfacesCastNoShadowsOnThemselves) {
+    ThreadPool pool(2);
+    Scene source = sourceOf(ring());
+    source.lighting.suns[0].direction_to_light = glm::normalize(Vec3(-1.0f, 0.35f, 0.3f));
+    SplatReport report;
+    const Scene model = modelOf(source, optionsOf(0.1, false), pool, report);
+    FrameRequest r;
+    r.camera = cameraTo(source, glm::normalize(Vec3(-0.2f, 0.9f, 0.6f)), 700.0, 384);
+    r.settings.width = r.settings.height = 384;
+    r.settings.subpixels = 2;
+    // 1: all of the sun's light, 0: none that is seen.
+    const auto lightOf = [&](const Scene& scene, Method method) {
+        r.settings.method = method;
+        r.settings.samples = method == Method::kRaycast ? 16 : 1;
+        r.settings.shadows = false;
+        const Image open = Renderer(scene, pool).render(r).image;
+        r.settings.shadows = true;
+        const Image shaded = Renderer(scene, pool).render(r).image;
+        std::vector<float> light;
+        for (int y = 0; y < r.settings.height; ++y) {
+            for (int x = 0; x < r.settings.width; ++x)
+                light.push_back(shaded.pixel(x, y)[1] / open.pixel(x, y)[1]);
+        }
+        return light;
+    };
+    const std::vector<float> rays = lightOf(source, Method::kRaycast),
+                             maps = lightOf(model, Method::kPoints);
+    int lit = 0, shaded = 0, dark = 0, bright = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        lit += rays[i] > 0.99f, dark += rays[i] > 0.99f && maps[i] < 0.9f;
+        shaded += rays[i] < 0.7f, bright += rays[i] < 0.7f && maps[i] > 0.9f;
+    }
+    EXPECT_GT(shaded, 1000);
+    EXPECT_LT(double(dark), 0.002 * double(lit));
+    EXPECT_LT(double(bright), 0.01 * double(shaded));
+}
+
 // A scan from 100 directions: no hole, alike in the mean, and fewer ellipses than circles. The
 // worst views, near and above, must not become worse.
 TEST(Splats, aScanIsClosedFromAbove) {
