@@ -49,7 +49,10 @@ InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node, 
 struct Branches {
     static constexpr uint8_t kChildren = 8, kKinds = 16;
     static uint8_t codeOfResident(uint32_t listed_index) {
-        return uint8_t(kChildren + mixBits32(listed_index) % kKinds);
+        // Neighbours, in rows of a grid and below each other, differ.
+        uint32_t fold = listed_index ^ listed_index >> 16;
+        fold ^= fold >> 8;
+        return uint8_t(kChildren + (fold ^ fold >> 4) % kKinds);
     }
     static bool isChild(uint8_t code) { return code < kChildren; }
 
