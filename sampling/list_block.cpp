@@ -180,10 +180,6 @@ void writePoint(const Point& p, int lane, ListBlock& out) {
     out.branch[lane] = p.branch;
 }
 
-}  // namespace
-
-namespace {
-
 PointKey listKey(const ListSource& source, uint32_t first) {
     const ListName& name = source.name;
     const ListIdentity& identity = source.identity;
