@@ -21,6 +21,7 @@ struct PointKey {
 // Where point `index` lies along the cumulated areas, in [0, 1): van der Corput, scrambled and
 // shifted at random, or random.
 double listPosition(const PointKey& key);
+
 // Where on a mesh a point lies.
 struct MeshPoint {
     uint32_t triangle = 0;
@@ -44,7 +45,7 @@ struct InstancePoint {
 // largest area scale) below a node. O(log n).
 InstancePoint instanceAt(const Scene& scene, const Group& group, uint32_t node, double position);
 
-// Where one may go on from a group's node: to a child, or to the residents of one of eight kinds,
+// Where one may go on from a group's node: to a child, or to the residents of one of sixteen kinds,
 // by their names. Their codes: the child's number, or eight and the kind.
 struct Branches {
     static constexpr uint8_t kChildren = 8, kKinds = 16;
