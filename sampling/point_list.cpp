@@ -261,10 +261,8 @@ void PointLists::sceneChanged(const SceneChanges& changes) {
     // To go through so many takes longer than to make lists anew; and where none waits for them,
     // edits are forgotten.
     constexpr size_t kMostEdits = 2048;
-    if (edits_.nodes.size() + edits_.instances.size() > kMostEdits) {
+    if (outdated_.empty() || edits_.nodes.size() + edits_.instances.size() > kMostEdits) {
         for (Outdated& outdated : outdated_) outdated.is_whole = true;
-        updateNames();
-    } else if (outdated_.empty()) {
         updateNames();
     }
     for (const uint32_t group : changed) {

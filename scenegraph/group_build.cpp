@@ -287,10 +287,8 @@ void buildGroup(Scene& scene, Group& group, const std::string& where, ThreadPool
     group.nodes.shrink_to_fit();
     group.area = group.nodes[0].area;
     group.max_triangle_area = group.nodes[0].max_triangle_area;
-    // As edits will sum it up: rounded outwards.
-    const Box3& rounded = group.nodes[0].bounds;
-    group.as_child = {rounded.isEmpty() ? DBox3() : DBox3{DVec3(rounded.min), DVec3(rounded.max)},
-                      group.area, group.max_triangle_area};
+    // As edits will sum it up.
+    group.as_child = {sumBounds(group), group.area, group.max_triangle_area};
 }
 
 size_t Group::bytes() const {

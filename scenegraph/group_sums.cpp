@@ -20,6 +20,11 @@ DMat3 absolute(const DMat3& m) { return DMat3(glm::abs(m[0]), glm::abs(m[1]), gl
 
 }  // namespace
 
+DBox3 sumBounds(const Group& group) {
+    const Box3 bounds = nodeBounds(group, 0);
+    return bounds.isEmpty() ? DBox3() : DBox3{DVec3(bounds.min), DVec3(bounds.max)};
+}
+
 bool instanceBox(const ChildSums& child, const Affine& group_from_child, DVec3& center,
                  DVec3& half) {
     const bool has_box = !child.bounds.isEmpty();

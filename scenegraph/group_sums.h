@@ -8,6 +8,9 @@ namespace stipple {
 
 ChildSums childSums(const Scene& scene, ChildRef child);
 
+// Of all that a built group holds, rounded outwards, with its slack; empty if there is nothing.
+DBox3 sumBounds(const Group& group);
+
 // An instance's box; false if it is empty (then center is the translation and half 0).
 bool instanceBox(const ChildSums& child, const Affine& group_from_child, DVec3& center,
                  DVec3& half);

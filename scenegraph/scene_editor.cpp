@@ -309,7 +309,7 @@ InstanceId SceneEditor::insertMany(uint32_t group_index, const std::vector<NewIn
     buildGroup(scene_, group, scene_.path + ": /groups/" + group.name, pool);
     group.as_child = as_child;
     updateSlack(group_index);
-    setBounds(group);
+    group.bounds = sumBounds(group);
     deepen(group_index, std::exchange(group.depth, depth_before));
     open_[group_index].reset();
     opened(group_index);
@@ -515,12 +515,6 @@ bool SceneEditor::updateSlack(uint32_t holder) {
     group.slack = float(slack * kRounding);
     rebuilt_.push_back(holder);
     return true;
-}
-
-void SceneEditor::setBounds(Group& group) const {
-    const Box3 bounds = nodeBounds(group, 0);
-    group.bounds =
-        group.nodes[0].area > 0.0 ? DBox3{DVec3(bounds.min), DVec3(bounds.max)} : DBox3();
 }
 
 // Numbers for people: in all groups above, too, from the innermost outwards.

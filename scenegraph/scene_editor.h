@@ -158,7 +158,6 @@ private:
     void groupChanged(uint32_t group, Dirty& dirty);
     void setOutgrown(uint32_t group, double length, Dirty& dirty);
     bool updateSlack(uint32_t holder);
-    void setBounds(Group& group) const;
     void addDirty(uint32_t group, uint32_t node, Dirty& dirty) const;
     void deepen(uint32_t group, int depth);
     int depthAbove(uint32_t group) const;

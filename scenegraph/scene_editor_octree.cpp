@@ -419,7 +419,7 @@ void SceneEditor::refreshNodes(uint32_t group_index, const std::vector<uint32_t>
     const GroupNode& root = group.nodes[0];
     group.area = root.area;
     group.max_triangle_area = root.max_triangle_area;
-    setBounds(group);
+    group.bounds = sumBounds(group);
 }
 
 }  // namespace stipple

@@ -51,6 +51,20 @@ Scene makeScene(size_t n, size_t tiles) {
     return scene;
 }
 
+// Group 2, the root, shows makeScene()'s root so often and so large.
+Scene makeWorld(size_t n, size_t tiles, int times, double scale) {
+    Scene scene = makeScene(n, tiles);
+    Group world;
+    world.name = "world";
+    for (int i = 0; i < times; ++i)
+        world.instances.add(ChildRef::group(0), {DMat3(scale), DVec3(2000.0 * i, 0, 0)});
+    scene.groups.push_back(world);
+    scene.root = 2;
+    ThreadPool pool(2);
+    buildScene(scene, pool);
+    return scene;
+}
+
 int treeDepth(const Group& group, uint32_t node = 0) {
     int depth = 0;
     for (uint32_t c = 0; c < group.nodes[node].child_count; ++c)
@@ -250,15 +264,7 @@ void expectEnclosed(const Scene& scene, const Group& group) {
 
 // Where a group is instanced often, what stands out of its bounds costs as little as what does not.
 TEST(SceneEditor, groupsInstancedOftenMayOutgrowTheirBounds) {
-    Scene scene = makeScene(50, 40);
-    Group world;
-    world.name = "world";
-    for (int i = 0; i < 30; ++i)
-        world.instances.add(ChildRef::group(0), {DMat3(0.5), DVec3(2000.0 * i, 0, 0)});
-    scene.groups.push_back(world);
-    scene.root = 2;
-    ThreadPool pool(2);
-    buildScene(scene, pool);
+    Scene scene = makeWorld(50, 40, 30, 0.5);
     const Scene before = scene;
     SceneEditor editor(scene);
     editor.open(1);
@@ -439,15 +445,8 @@ TEST(SceneEditor, cachedPointsFollow) {
 
 // Of groups of groups, too, where the groups within are edited.
 TEST(SceneEditor, cachedPointsOfNestedGroupsFollow) {
-    Scene scene = makeScene(20, 3);
-    Group world;
-    world.name = "world";
-    for (int i = 0; i < 10; ++i)
-        world.instances.add(ChildRef::group(0), {DMat3(1.0), DVec3(2000.0 * i, 0, 0)});
-    scene.groups.push_back(world);
-    scene.root = 2;
+    Scene scene = makeWorld(20, 3, 10, 1.0);
     ThreadPool pool(2);
-    buildScene(scene, pool);
     SceneEditor editor(scene);
     PointLists lists(scene);
     ASSERT_TRUE(lists.hasLists(ChildRef::group(0)));
